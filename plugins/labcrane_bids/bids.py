@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from labcrane import Machine
-from labcrane.analysis import Exporter, Participant, eeg_streams
+from labcrane.analysis import Exporter, Participant, answers_of, eeg_streams
 from labcrane.recording import SessionRecord
 from labcrane_bids.dataset import (
     copy_phenotype,
@@ -18,7 +18,7 @@ from labcrane_bids.eeg import eeg_description, write_eeg
 from labcrane_bids.events import event_description, event_table
 from labcrane_bids.files import first_tick, label, write_bare_tsv, write_json, write_tsv
 from labcrane_bids.motion import TrackingSystem, tracking_systems
-from labcrane_bids.phenotype import Phenotype
+from labcrane_bids.phenotype import Phenotype, demographics_of
 from labcrane_bids.physio import continuous_recordings, left_out
 from labcrane_bids.settings import BidsSettings
 
@@ -30,11 +30,18 @@ class Bids(Exporter):
     """Motion with one tracking system per device, EEG, eye tracking, physio, events, phenotype.
 
     EEG is written as BrainVision files, sample by sample as it was recorded; each event is at the
-    sample that was taken when it happened, by the corrected clock. Streams of texts, and of numbers
+    sample that was taken when it happened, by the corrected clock. A questionnaire that somebody
+    was asked more than once is in ``beh`` with its trials. Streams of texts, and of numbers
     without a rate, have no place in BIDS: the README names them.
     """
 
-    shared = ("dataset_description.json", "README", "participants.json", "phenotype/*.json")
+    shared = (
+        "dataset_description.json",
+        "README",
+        "participants.json",
+        "phenotype/*.json",
+        "task-*_beh.json",
+    )
 
     def __init__(self, settings: BidsSettings, machine: Machine) -> None:
         self._settings = settings
@@ -49,11 +56,13 @@ class Bids(Exporter):
             context = participant.context
             contexts.append(context)
             subject = f"sub-{label(participant.name)}"
-            phenotype.add(subject, participant)
+            answers = answers_of(participant)
+            phenotype.add(subject, participant, answers)
             told = known.get(participant.name, {})
             rows.append(
                 {"participant_id": subject}
                 | dict.fromkeys(PERSON)
+                | demographics_of(answers)
                 | {"group": _group(participant)}
                 | {name: cell for name, cell in told.items() if name in PERSON}
                 | {"status": str(participant.status)}

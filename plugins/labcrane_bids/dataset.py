@@ -82,8 +82,14 @@ def describe_participants(folder: Path, rows: Sequence[Mapping[str, object]]) ->
     write_json(
         folder / "participants.json",
         {
-            "age": {"Description": "age of the participant", "Units": "year"},
-            "sex": {"Description": "sex as reported", "Levels": {"F": "female", "M": "male"}},
+            "age": {
+                "Description": "age of the participant as first reported; 89+ for 89 and above",
+                "Units": "year",
+            },
+            "sex": {
+                "Description": "sex as reported",
+                "Levels": {"F": "female", "M": "male", "O": "other"},
+            },
             "handedness": {
                 "Description": "handedness as reported",
                 "Levels": {"L": "left", "R": "right", "A": "ambidextrous"},

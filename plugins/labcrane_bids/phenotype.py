@@ -1,17 +1,28 @@
-"""Questionnaires of the recordings: a table and its description for each, under phenotype."""
+"""Questionnaires of the recordings: a table and its description for each.
+
+BIDS 1.11 allows one row per participant in ``phenotype``. A questionnaire that somebody was asked
+more often is in ``beh`` instead: one table per session, one row for each time, with its trial.
+"""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from labcrane.analysis import Participant, answers_of, asked_in, scores_of
+from labcrane.analysis import Participant, asked_in, scores_of
 from labcrane_bids.files import label, write_json, write_tsv
 
 if TYPE_CHECKING:
     import pandas as pd
 
 PHENOTYPE = "phenotype"
+DEMOGRAPHICS = "demographics "
+"""How the version of such a questionnaire begins: with its offer."""
+
+CODES = {"female": "F", "male": "M", "other": "O", "left": "L", "right": "R", "both": "A"}
+OLDEST = 89
+"""Age in years from which BIDS recommends not to tell it: it could lead to a person."""
+
 KEYS = ["session", "step", "block", "trial"]
 
 COLUMNS: Mapping[str, Mapping[str, str]] = {
@@ -25,17 +36,17 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
 
 
 class Phenotype:
-    """Takes what each participant answered; there is one row for each time that it was asked."""
+    """Answers and scores of all participants, one row for each time that they were asked."""
 
     def __init__(self) -> None:
         self._rows: dict[str, list[dict[str, Any]]] = {}
         self._about: dict[str, Mapping[str, Any]] = {}
 
-    def add(self, subject: str, participant: Participant) -> None:
+    def add(self, subject: str, participant: Participant, answers: "pd.DataFrame") -> None:
         """Take up one participant's answers and scores."""
         for _, session in participant.sessions():
             self._about |= asked_in(session)
-        answers, scores = answers_of(participant), scores_of(participant)
+        scores = scores_of(participant)
         for name in dict.fromkeys(answers["questionnaire"]):
             own = answers[answers["questionnaire"] == name]
             worth = scores[scores["questionnaire"] == name]
@@ -44,19 +55,27 @@ class Phenotype:
                 self._rows.setdefault(str(name), []).append(row | _scored(times, worth))
 
     def write(self, folder: Path) -> Sequence[str]:
-        """Write the tables; return their names."""
+        """Write the tables; return what they would be called in ``phenotype``."""
         import pandas as pd
 
+        tasks = _tasks(self._rows)
         for name, rows in self._rows.items():
-            (folder / PHENOTYPE).mkdir(exist_ok=True)
             table = pd.DataFrame(rows)
             for column in ("block", "trial"):
                 table[column] = table[column].astype("Int64")
-            stem = label_of(name)
-            write_tsv(folder / PHENOTYPE / f"{stem}.tsv", table)
             about = self._described(name, list(map(str, table)))
-            write_json(folder / PHENOTYPE / f"{stem}.json", about)
+            if table["participant_id"].duplicated().any():
+                about = {"TaskName": tasks[name], "TaskDescription": self._title(name), **about}
+                _write_repeated(folder, f"task-{tasks[name]}_beh", table, about)
+                continue
+            (folder / PHENOTYPE).mkdir(exist_ok=True)
+            write_tsv(folder / PHENOTYPE / f"{label_of(name)}.tsv", table)
+            about = {"MeasurementToolMetadata": {"Description": self._title(name)}, **about}
+            write_json(folder / PHENOTYPE / f"{label_of(name)}.json", about)
         return [label_of(name) for name in self._rows]
+
+    def _title(self, name: str) -> str:
+        return str(self._about.get(name, {}).get("title") or name)
 
     def _described(self, name: str, columns: Sequence[str]) -> dict[str, Any]:
         about = self._about.get(name, {})
@@ -70,18 +89,52 @@ class Phenotype:
             for score in about.get("scores", ())
         }
         known = {**COLUMNS, **items, **scores}
-        described = {
+        return {
             column: dict(known.get(column, {"Description": column.replace("_", " ")}))
             for column in columns
             if column != "participant_id"
         }
-        tool = {"Description": str(about.get("title") or name)}
-        return {"MeasurementToolMetadata": tool, **described}
 
 
 def label_of(name: str) -> str:
     """Return what the table of a questionnaire is called."""
     return "_".join(filter(None, map(label, name.split("_"))))
+
+
+def _write_repeated(
+    folder: Path, stem: str, table: "pd.DataFrame", about: Mapping[str, Any]
+) -> None:
+    """Write a table for each session, and one description for all of them."""
+    for (subject, session), rows in table.groupby(["participant_id", "session_id"]):
+        beh = folder / str(subject) / str(session) / "beh"
+        beh.mkdir(exist_ok=True)
+        own = rows.drop(columns=["participant_id", "session_id"])
+        write_tsv(beh / f"{subject}_{session}_{stem}.tsv", own)
+    write_json(folder / f"{stem}.json", {k: v for k, v in about.items() if k != "session_id"})
+
+
+def _tasks(names: Iterable[str]) -> dict[str, str]:
+    """Return what each questionnaire is called in the name of a file, all different."""
+    tasks: dict[str, str] = {}
+    for name in names:
+        task = label(name)
+        while task in tasks.values():
+            task += "x"
+        tasks[name] = task
+    return tasks
+
+
+def demographics_of(answers: "pd.DataFrame") -> dict[str, str]:
+    """Return age, sex and handedness as they were first answered, in the codes of BIDS."""
+    told: dict[str, str] = {}
+    for row in answers[answers["version"].str.startswith(DEMOGRAPHICS)].to_dict("records"):
+        item, value = row["item"], row["value"]
+        code = CODES.get(row["text"]) if item in {"sex", "handedness"} else None
+        if item == "age" and not math.isnan(value):
+            code = f"{value:g}" if value < OLDEST else f"{OLDEST}+"
+        if code:
+            told.setdefault(item, code)
+    return told
 
 
 def _row(subject: str, answers: "pd.DataFrame") -> dict[str, Any]:

@@ -30,7 +30,8 @@ class BidsSettings(Settings):
     """SPDX name of the licence."""
 
     people: Path | None = None
-    """A CSV file with the columns participant, age, sex, handedness and group, as far as known."""
+    """A CSV file with the columns participant, age, sex, handedness and group, as far as known;
+    what it says replaces what was recorded."""
 
     phenotype: Path | None = None
     """A folder of CSV files, one per questionnaire, each with a column participant and a JSON file

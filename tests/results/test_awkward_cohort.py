@@ -1,5 +1,6 @@
 """Unlike people through every exporter, to the programs that read it."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from scipy.io import loadmat, savemat
 from labcrane.analysis.measures import measures_of
 from results.awkward import ANSWERS, FORMULA, HALF_FINISHED, NULL, Awkward
 from results.consumers import needs_octave, octave, table
+from results.test_bids import errors, validated
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("awkward")]
 
@@ -54,3 +56,46 @@ def test_octave_refuses_people_of_two_studies(awkward: Awkward, tmp_path: Path) 
     caught = "try; read_labcrane(argument); catch e; disp(e.message); end"
     said = octave(f"addpath(argument); {caught}", tmp_path)
     assert "P001 is of the study 'rehearsal' and P001 of 'another'; read each study" in said
+
+
+@validated
+def test_the_bids_validator_finds_no_error(awkward: Awkward) -> None:
+    assert errors(awkward.export("bids")) == []
+
+
+def answers_in(path: Path) -> pd.DataFrame:
+    return pd.read_csv(path, sep="\t", na_values=["n/a"], keep_default_na=False)
+
+
+def test_bids_has_each_answer_with_its_trial(awkward: Awkward) -> None:
+    folder = awkward.export("bids")
+    for name, given in ANSWERS.items():
+        beh = folder / f"sub-{name}" / "ses-01" / "beh"
+        loads = answers_in(beh / f"sub-{name}_ses-01_task-nasatlx_beh.tsv")
+        load = 10 * int(name[-1])
+        assert loads["mental"].tolist() == ([load] if name == HALF_FINISHED else [load, 2 * load])
+        assert loads["trial"].isna().all()
+        rated = answers_in(beh / f"sub-{name}_ses-01_task-accuracy_beh.tsv")
+        if name != HALF_FINISHED:
+            trials = measures_of(next(p for p in awkward.cohort.included if p.name == name))
+            assert rated["trial"].tolist() == trials.query("session == 1")["trial"].tolist()
+            assert rated["rating"].tolist() == [given["rating"]] * len(rated)
+    about = json.loads((folder / "task-nasatlx_beh.json").read_text(encoding="utf-8"))
+    assert set(loads) <= set(about)
+    assert about["TaskDescription"] == "NASA task load index"
+    why = answers_in(folder / "phenotype" / "why.tsv").set_index("participant_id")["why"]
+    assert why["sub-P001"] == FORMULA
+    assert why["sub-P002"] == NULL
+
+
+def test_recorded_demographics_are_in_the_table_of_people(awkward: Awkward) -> None:
+    people = pd.read_csv(awkward.export("bids") / "participants.tsv", sep="\t", dtype=str,
+                         keep_default_na=False)  # fmt: skip
+    assert people[["age", "sex", "handedness"]].to_numpy().tolist() == [
+        ["24", "F", "R"],
+        ["31", "M", "A"],
+        ["89+", "O", "L"],
+        ["n/a", "n/a", "n/a"],
+    ]
+    about = json.loads((awkward.export("bids") / "participants.json").read_text(encoding="utf-8"))
+    assert set(people["sex"]) - {"n/a"} <= set(about["sex"]["Levels"])
