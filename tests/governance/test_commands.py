@@ -1,5 +1,6 @@
 """The commands about people, as the examiner types them, with real processes."""
 
+import io
 import json
 import subprocess
 import sys
@@ -71,7 +72,7 @@ def test_from_approval_to_erasure(study: Path, capsys: pytest.CaptureFixture[str
         path.read_text(encoding="utf-8") for path in Path("data/exports/tables").rglob("*.csv")
     )
     assert "P003" in exported
-    said = say(capsys, "erase", "P003", "--reason", "withdrew")
+    said = say(capsys, "erase", "P003", "--reason", "withdrew", "--yes")
     assert "P003 is erased. labcrane cannot reach backups" in said
     assert f"P003 erased on {TODAY}: withdrew" in say(capsys, "participants")
     left = b"".join(path.read_bytes() for path in Path("data/exports").rglob("*.csv"))
@@ -101,6 +102,44 @@ def test_a_change_is_refused_in_words_and_amended(
         json.loads(Path("study.lock.json").read_text(encoding="utf-8"))["approval"]["board"]
         == "Ethics board"
     )
+
+
+class Terminal(io.StringIO):
+    """A terminal at which somebody types."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.slow
+def test_erase_asks_at_a_terminal_for_the_pseudonym(
+    study: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    approve(capsys)
+    for name in ("P001", "P003"):
+        say(capsys, "consent", "study.yaml", name)
+    words = ("erase", "P003", "--reason", "withdrew")
+    monkeypatch.setattr("sys.stdin", Terminal("P001\n"))
+    said = say(capsys, *words, status=2)
+    assert "register.json" in said
+    assert "'P001' was typed, not 'P003'; nothing was erased" in said
+    assert "P003 erased" not in say(capsys, "participants")
+    monkeypatch.setattr("sys.stdin", Terminal("P003\n"))
+    assert "P003 is erased." in say(capsys, *words)
+    assert f"P003 erased on {TODAY}" in say(capsys, "participants")
+
+
+def test_erase_without_a_terminal_wants_yes(
+    study: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    approve(capsys)
+    say(capsys, "consent", "study.yaml", "P003")
+    monkeypatch.setattr("sys.stdin", io.StringIO())
+    words = ("erase", "P003", "--reason", "withdrew")
+    said = say(capsys, *words, status=2)
+    assert "erasing P003 cannot be undone, and there is no terminal at which to ask" in said
+    assert "--yes erases it without asking" in said
+    assert "P003 is erased." in say(capsys, *words, "--yes")
 
 
 def test_a_date_that_is_none_is_told(study: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -122,7 +122,7 @@ def test_erasing_ends_with_what_nobody_could_search(
     (lab.places.root / "old").mkdir()
     (lab.places.root / "old" / "notes.xlsx").write_bytes(OFFICE)
     (lab.places.root / "both.zip").write_bytes(zipped(NOTE) + locked(NOTE))
-    words = ["erase", "P007", "--data", str(lab.places.root), "--reason", REASON]
+    words = ["erase", "P007", "--data", str(lab.places.root), "--reason", REASON, "--yes"]
     assert main(words) == 0
     said = " ".join(capsys.readouterr().out.split())
     told = "cannot be searched for P007; open it yourself, and see:"

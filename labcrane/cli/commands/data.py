@@ -1,5 +1,6 @@
 """Commands about participants' data: erase, relabel, transfer."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,14 +9,18 @@ import typer
 from labcrane.cli.commands.approval import today
 from labcrane.cli.commands.participants import HERE, Data, Reason, Someone
 from labcrane.cli.output import out
+from labcrane.errors import ProtocolError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from labcrane.participants.copies import Reach
+    from labcrane.participants.folders import Places
+    from labcrane.participants.inventory import InventoryEntry
 
 
 def where(participant: Someone, data: Data = HERE) -> None:
     """List every place that holds a participant's data."""
-    from labcrane.cli.output import whole_table
     from labcrane.participants.folders import Places
     from labcrane.participants.inventory import inventory
 
@@ -23,19 +28,24 @@ def where(participant: Someone, data: Data = HERE) -> None:
     if not found:
         out.print(f"nothing of {participant} is in {data}, nor known to its register", markup=False)
         return
-    table = whole_table("what", "where", "state")
-    for each in found:
-        table.add_row(each.what, each.where, each.state)
-    out.print(table)
+    _list(found)
 
 
-def erase(participant: Someone, reason: Reason, data: Data = HERE) -> None:
+def erase(
+    participant: Someone,
+    reason: Reason,
+    yes: Annotated[bool, typer.Option("--yes", help="do not ask; for scripts")] = False,
+    data: Data = HERE,
+) -> None:
     """Remove a participant's data from everything labcrane wrote; a tombstone stays."""
     from labcrane.participants import recovery as unfinished
     from labcrane.participants.erasure import BEYOND
     from labcrane.participants.folders import Places
 
-    done = unfinished.erase(Places(data), participant, reason, today())
+    places = Places(data)
+    if not yes:
+        _confirm_erasure(places, participant)
+    done = unfinished.erase(places, participant, reason, today())
     _say(done.reach)
     for path in done.mentions:
         out.print(f"still mentions {participant}: {path}", markup=False)
@@ -44,6 +54,35 @@ def erase(participant: Someone, reason: Reason, data: Data = HERE) -> None:
             f"cannot be searched for {participant}; open it yourself, and see: {what}", markup=False
         )
     out.print(f"{participant} is erased. {BEYOND}", markup=False)
+
+
+def _confirm_erasure(places: "Places", participant: str) -> None:
+    """Show what will go, and have the pseudonym typed again."""
+    from labcrane.participants.inventory import inventory
+
+    found = inventory(places, participant)
+    if not found:  # which erasing refuses
+        return
+    if not sys.stdin.isatty():
+        raise ProtocolError(
+            f"erasing {participant} cannot be undone, and there is no terminal at which to ask; "
+            f"labcrane where {participant} lists what would go, --yes erases it without asking"
+        )
+    _list(found)
+    typed = typer.prompt(
+        f"All data of {participant} in these places will be erased; type {participant} to confirm"
+    )
+    if typed != participant:
+        raise ProtocolError(f"{typed!r} was typed, not {participant!r}; nothing was erased")
+
+
+def _list(found: "Sequence[InventoryEntry]") -> None:
+    from labcrane.cli.output import whole_table
+
+    table = whole_table("what", "where", "state")
+    for each in found:
+        table.add_row(each.what, each.where, each.state)
+    out.print(table)
 
 
 def relabel(
