@@ -51,11 +51,12 @@ def missing_consent(visit: "Visit") -> Missing | None:
     Raises
     ------
     ProtocolError
-        The study may not be run with people at all.
+        The study may not be run with people at all, or not with more than are enrolled.
     """
     if visit.pilot or visit.simulated:
         return None
     from labcrane.approval.decision import verify
+    from labcrane.participants.enrolment import check_planned
     from labcrane.participants.folders import Places
     from labcrane.participants.register import read
     from labcrane.registry.registry import discover
@@ -64,6 +65,7 @@ def missing_consent(visit: "Visit") -> Missing | None:
     lock = verify(visit.study, discover(study=visit.study.path), today())
     register = read(Places(visit.data))
     lock.check_before(register.locks)
+    check_planned(register, visit.study, visit.participant)
     entry = register.participants.get(visit.participant)
     if entry and any(given.version == lock.consent_version for given in entry.consent):
         return None

@@ -15,7 +15,39 @@ from labcrane.participants.register import Consent, Deviation, Entry, Exclusion,
 from labcrane.protocol.study import Study
 
 
-def _entry(register: Register, study: Study, participant: str, today: date) -> Entry:
+def check_planned(register: Register, study: Study, participant: str) -> None:
+    """Refuse a new participant beyond the number that the protocol states, as was approved.
+
+    Who was excluded and has left the slot to another one does not count.
+
+    Raises
+    ------
+    ProtocolError
+        That many are enrolled already.
+    """
+    if (beyond := _beyond_planned(register, study, participant)) is not None:
+        raise ProtocolError(
+            f"{participant} would be participant {beyond} that are planned; exclude those who "
+            "dropped out, amend participants: planned, or enrol with labcrane consent "
+            "--beyond-planned, which is a deviation"
+        )
+
+
+def _beyond_planned(register: Register, study: Study, participant: str) -> str | None:
+    """Return the number of a new participant beyond the plan, as ``5 of 4``; None within it.
+
+    A protocol that states no number plans none.
+    """
+    people = study.protocol.participants
+    if participant in register.participants or "planned" not in people.model_fields_set:
+        return None
+    count = 1 + len(register.slots())
+    return f"{count} of {people.planned}" if count > people.planned else None
+
+
+def _entry(
+    register: Register, study: Study, participant: str, today: date, *, beyond_planned: bool
+) -> Entry:
     register.check_finished()
     name = study.protocol.study
     register.check_study(name)
@@ -33,6 +65,12 @@ def _entry(register: Register, study: Study, participant: str, today: date) -> E
         seed=derive(name, participant),
         enrolled=today.isoformat(),
     )
+    if (beyond := _beyond_planned(register, study, participant)) is not None:
+        if not beyond_planned:
+            check_planned(register, study, participant)
+        entry.deviations.append(
+            Deviation(what="enrolled beyond the plan", detail=beyond, date=today.isoformat())
+        )
     register.participants[participant] = entry
     return entry
 
@@ -70,6 +108,8 @@ def confirm_consent(
     text: tuple[str, str],
     today: date,
     by: Literal["examiner", "participant"] = "examiner",
+    *,
+    beyond_planned: bool = False,
 ) -> Entry:
     """Record that a participant has consented, and enrol the participant if need be.
 
@@ -77,11 +117,18 @@ def confirm_consent(
     ----------
     text
         File and version of the consent text in the lock.
+    beyond_planned
+        Whether a participant beyond the number that is planned is enrolled, which is a deviation.
+
+    Raises
+    ------
+    ProtocolError
+        The participant cannot be enrolled.
     """
     study.check_participant(participant)
     file, version = text
     with changed(places) as register:
-        entry = _entry(register, study, participant, today)
+        entry = _entry(register, study, participant, today, beyond_planned=beyond_planned)
         if all(consent.version != version for consent in entry.consent):
             entry.consent.append(Consent(version=version, file=file, date=today.isoformat(), by=by))
     return entry

@@ -112,6 +112,31 @@ class Terminal(io.StringIO):
 
 
 @pytest.mark.slow
+def test_more_participants_than_planned_are_a_deviation(
+    study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    planned = GOVERNED.replace("title:", "participants: {planned: 2}\ntitle:")
+    Path("study.yaml").write_text(planned, encoding="utf-8")
+    approve(capsys)
+    for name in ("P001", "P002", "P001"):
+        say(capsys, "consent", "study.yaml", name)
+    told = "P003 would be participant 3 of 2 that are planned; exclude those who dropped out"
+    assert told in say(capsys, "consent", "study.yaml", "P003", status=2)
+    run = ["run", "study.yaml", "--participant", "P003", "--local", "--no-page"]
+    assert told in say(capsys, *run, status=2)
+    assert "P003" not in say(capsys, "participants")
+    say(capsys, "exclude", "P001", "--reason", "dropped out")
+    say(capsys, "consent", "study.yaml", "P003")
+    assert "no deviations" in say(capsys, "deviations")
+    assert "P004 would be participant 3 of 2" in say(
+        capsys, "consent", "study.yaml", "P004", status=2
+    )
+    said = say(capsys, "consent", "study.yaml", "P004", "--beyond-planned")
+    assert "P004 has consented" in said
+    assert "P004 │ - │ - │ enrolled beyond the plan │ 3 of 2" in say(capsys, "deviations")
+
+
+@pytest.mark.slow
 def test_erase_asks_at_a_terminal_for_the_pseudonym(
     study: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -42,7 +42,15 @@ def participants(data: Data = HERE) -> None:
         out.print(f"export {export.exporter} of {export.date}: {export.folder}", markup=False)
 
 
-def consent(protocol: ProtocolPath, participant: Someone, data: DataBeside = None) -> None:
+def consent(
+    protocol: ProtocolPath,
+    participant: Someone,
+    beyond_planned: Annotated[
+        bool,
+        typer.Option("--beyond-planned", help="enrol more than are planned, which is a deviation"),
+    ] = False,
+    data: DataBeside = None,
+) -> None:
     """Confirm that a participant has consented to the approved text, and enrol the participant."""
     from labcrane.approval.decision import verify
     from labcrane.participants.enrolment import confirm_consent
@@ -57,7 +65,9 @@ def consent(protocol: ProtocolPath, participant: Someone, data: DataBeside = Non
     text = (lock.approval["consent"], lock.consent_version)
     places = Places(data_folder(data, protocol))
     lock.check_before(read(places).locks)
-    entry = confirm_consent(places, study, participant, text, today())
+    entry = confirm_consent(
+        places, study, participant, text, today(), beyond_planned=beyond_planned
+    )
     group = f", group {entry.group}" if entry.group else ""
     out.print(
         f"{participant} has consented to {text[0]} (version {text[1]}); slot {entry.slot}{group}, "
