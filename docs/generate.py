@@ -240,8 +240,10 @@ def recorded(component: Component | None) -> Iterator[str]:
         groups |= {f"Stream `{name}`": signals for name, signals in component.streams.items()}
     for title, signals in groups.items():
         if signals:
-            yield from ("", f"{title}:", "", "| signal | unit | components |", "|---|---|---|")
-            yield from map(signal_row, signals)
+            defined = any(signal.definition for signal in signals)
+            last = "definition" if defined else "components"
+            yield from ("", f"{title}:", "", f"| signal | unit | {last} |", "|---|---|---|")
+            yield from map(definition_row if defined else signal_row, signals)
     if isinstance(component, Questionnaire):
         rows = (
             f"| `{each.name}` | {each.lowest:g} to {each.highest:g} |" for each in component.scores
@@ -254,6 +256,11 @@ def signal_row(signal: Signal) -> str:
     """Return a row of a table of signals."""
     parts = ", ".join(f"`{part}`" for part in signal.components) or "one number"
     return f"| `{signal.name}` | {signal.unit} | {parts} |"
+
+
+def definition_row(signal: Signal) -> str:
+    """Return a row of a table of results."""
+    return f"| `{signal.name}` | {signal.unit} | {cell(signal.definition)} |"
 
 
 def floors() -> str:

@@ -64,6 +64,7 @@ def trial_codebook(
     asked = _asked(sessions)
 
     units = session.context.get("trial_units", {})
+    definitions = session.context.get("trial_definitions", {})
     gaze = gaze_units(measures.columns)
     rows = []
     for column in map(str, measures.columns):
@@ -77,7 +78,8 @@ def trial_codebook(
         elif column in asked:
             row = ("", asked[column], WRITTEN)
         else:
-            row = (str(units.get(column, "")), column.replace("_", " "), WRITTEN)
+            defined = str(definitions.get(column) or column.replace("_", " "))
+            row = (str(units.get(column, "")), defined, WRITTEN)
         rows.append(("trials", column, *row))
     return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
 

@@ -12,7 +12,7 @@ from labcrane.files.pseudonyms import pseudonyms
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.frame_log import LOOP
-from labcrane.recording.trial_columns import UNITS, trial_units
+from labcrane.recording.trial_columns import OWN, UNITS, trial_units
 
 CORE = "labcrane"
 ABOUT = (
@@ -41,12 +41,15 @@ class CodebookColumn:
         SI symbol; "1" when dimensionless, "" for texts.
     source
         Who makes it: labcrane, or a plugin and what it offers.
+    definition
+        What it is, where it is a result of a task or of every trial.
     """
 
     table: str
     name: str
     unit: str
     source: str
+    definition: str = ""
 
 
 def codebook(study: Study) -> list[CodebookColumn]:
@@ -72,8 +75,10 @@ def _trials(study: Study) -> list[CodebookColumn]:
     found: dict[str, CodebookColumn] = {}
     about = [name for name in ABOUT if _has(study, name)]
     units = {**UNITS, **{name: "1" for name in FLAGS if name in about}}
+    defined = {signal.name: signal.definition for signal in OWN}
     for name in (*about, *units):
-        found[name] = CodebookColumn("trials", name, units.get(name, ""), CORE)
+        unit = units.get(name, "")
+        found[name] = CodebookColumn("trials", name, unit, CORE, defined.get(name, ""))
     for name, (task, values) in _conditions(study).items():
         choice = study.task_choices[task]
         unit = trial_units(study.tasks[task]).get(name, "" if _is_text(values) else "1")
@@ -82,7 +87,7 @@ def _trials(study: Study) -> list[CodebookColumn]:
         for signal in study.tasks[task].results:
             for name in signal.columns:
                 source = f"{choice.plugin}: {choice.name}"
-                found[name] = CodebookColumn("trials", name, signal.unit, source)
+                found[name] = CodebookColumn("trials", name, signal.unit, source, signal.definition)
     return list(found.values())
 
 
@@ -124,7 +129,9 @@ def rows(columns: Sequence[CodebookColumn]) -> list[dict[str, str]]:
 def as_csv(codebook_rows: Sequence[Mapping[str, str]]) -> str:
     """Return the codebook as comma-separated values."""
     out = io.StringIO()
-    writer = csv.DictWriter(out, ["table", "name", "unit", "source"], lineterminator="\n")
+    writer = csv.DictWriter(
+        out, ["table", "name", "unit", "source", "definition"], lineterminator="\n"
+    )
     writer.writeheader()
     writer.writerows(codebook_rows)
     return out.getvalue()

@@ -135,7 +135,9 @@ class Task(Component):
     """What the operator is asked to do, and when a trial ends."""
 
     results: tuple[Signal, ...] = ()
-    """What a finished trial is measured by, with units; columns of the trial table."""
+    """What a finished trial is measured by, with units and definitions; columns of the trial table.
+
+    Codebook, participant file, report and reference take the definitions from here."""
 
     condition_units: Mapping[str, str] = {}
     """Units of the numbers in its trials' conditions; ``"1"`` for counts and ratios."""

@@ -1,7 +1,7 @@
 """Named quantities, and where they sit in an array."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from labcrane.errors import ProtocolError
@@ -9,7 +9,7 @@ from labcrane.errors import ProtocolError
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """A named quantity with one sample per tick.
+    """A named quantity with one sample per tick, or per trial.
 
     Attributes
     ----------
@@ -19,11 +19,14 @@ class Signal:
         SI symbol; ``"1"`` when dimensionless.
     components
         Names of the parts of a vector, ``("slew", "shoulder")``; empty for a scalar.
+    definition
+        What it is, in a sentence without a full stop; a result of a task has one.
     """
 
     name: str
     unit: str
     components: tuple[str, ...] = ()
+    definition: str = field(default="", compare=False)
 
     @property
     def shape(self) -> tuple[int, ...]:

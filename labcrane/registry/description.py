@@ -43,6 +43,7 @@ class Recorded:
     column: str
     unit: str
     where: str
+    definition: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +157,9 @@ def _recorded(
     if isinstance(component, Task):
         found += [("every trial", signal) for signal in component.results]
     columns = [
-        Recorded(column, signal.unit, where) for where, signal in found for column in signal.columns
+        Recorded(column, signal.unit, where, signal.definition)
+        for where, signal in found
+        for column in signal.columns
     ]
     if isinstance(component, Questionnaire):
         columns += [Recorded(score.name, "1", "every time") for score in component.scores]

@@ -17,7 +17,7 @@ from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.referenced_files import named_files
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
-from labcrane.recording.trial_columns import trial_units
+from labcrane.recording.trial_columns import trial_definitions, trial_units
 from labcrane.registry.entry_points import entry_points_of
 from labcrane.registry.hookspecs import PROJECT
 from labcrane.registry.loader import own_plugins
@@ -128,6 +128,11 @@ def _of_study(study: Study, *, simulated: bool) -> dict[str, Any]:
             column: unit
             for task in study.tasks.values()
             for column, unit in trial_units(task).items()
+        },
+        "trial_definitions": {
+            column: definition
+            for task in study.tasks.values()
+            for column, definition in trial_definitions(task).items()
         },
     }
 

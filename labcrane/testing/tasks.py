@@ -92,6 +92,13 @@ class TaskContract:
                 over = task.evaluate(late).phase.over
                 assert not over, "after lift_limits() a trial must not end by itself"
 
+    def test_results_have_a_definition(self, task: Task) -> None:
+        bare = [signal.name for signal in task.results if not signal.definition]
+        assert not bare, (
+            f"the results {', '.join(bare)} have no definition; say what each is, in "
+            "Signal(name, unit, definition=...): the codebook and the report print it"
+        )
+
     def test_results_are_declared(self, task: Task) -> None:
         run = self._run(task)
         declared = {column for signal in task.results for column in signal.columns}

@@ -38,26 +38,76 @@ class Aiming(Task):
     )
 
     results = (
-        Signal("reaction_time", "s"),  # from the trial's start to the first stick beyond its dead
-        # zone, once all were within it: a stick that is still held from before answers nothing
-        Signal("command_onset", "s"),  # from the trial's start to the first command
-        Signal("movement_onset", "s"),  # from the trial's start to the machine's onset
-        Signal("onset_speed", "m/s"),  # of the tip, by which that was found; where a recording has
-        Signal("onset_hold", "s"),  # none of these three, its onset is by a former rule
-        Signal("movement_time", "s"),  # from onset to offset
-        Signal("onset_to_rest", "s"),  # from onset to the beginning of the rest it ended in
-        Signal("at_rest", "s"),  # how long that rest was when the trial ended; 0 while moving
-        Signal("circle_to_circle", "s"),  # from the trial's start, the end of the one before; NaN
-        # without an onset, as the times before it
-        Signal("between_circles", "s"),  # from leaving the one circle to entering the other
-        Signal("first_entry", "s"),  # from the trial's start to the first time inside
-        Signal("entries", "1"),  # times the tip came into the circle
-        Signal("error", "m"),  # distance of tip and circle's centre at the offset
-        Signal("error_along", "m"),  # the same along the task axis, positive for too far
-        Signal("error_across", "m"),  # the same across the task axis
-        Signal("error_bound", "m"),  # largest error the end rule allows; NaN where it allows any
-        Signal("path_length", "m"),  # from onset to offset
-        Signal("peak_speed", "m/s"),
+        Signal(
+            "reaction_time",
+            "s",
+            definition=(
+                "from the trial's start to the first stick beyond its dead zone, once all were "
+                "within it: a stick that is still held from before answers nothing"
+            ),
+        ),
+        Signal("command_onset", "s", definition="from the trial's start to the first command"),
+        Signal("movement_onset", "s", definition="from the trial's start to the machine's onset"),
+        Signal(
+            "onset_speed",
+            "m/s",
+            definition=(
+                "speed of the tip by which the onset was found; recordings without it have their "
+                "onset by a former rule"
+            ),
+        ),
+        Signal(
+            "onset_hold",
+            "s",
+            definition="how long the tip had to be faster than onset_speed for an onset",
+        ),
+        Signal(
+            "movement_time",
+            "s",
+            definition=(
+                "from the machine's onset to the offset: the tap, or the beginning of the rest "
+                "that ended the movement; without reaction time. Dreger et al. mean "
+                "circle_to_circle by movement time"
+            ),
+        ),
+        Signal(
+            "onset_to_rest",
+            "s",
+            definition=(
+                "from the machine's onset to the beginning of the rest in which the movement ended"
+            ),
+        ),
+        Signal(
+            "at_rest", "s", definition="how long that rest was when the trial ended; 0 while moving"
+        ),
+        Signal(
+            "circle_to_circle",
+            "s",
+            definition=(
+                "from the end of the movement before, the trial's start, to the offset, with "
+                "reaction time and dwell: the movement time of Dreger et al.; NaN without an "
+                "onset"
+            ),
+        ),
+        Signal(
+            "between_circles", "s", definition="from leaving the one circle to entering the other"
+        ),
+        Signal(
+            "first_entry", "s", definition="from the trial's start to the first time in the circle"
+        ),
+        Signal("entries", "1", definition="times that the tip came into the circle"),
+        Signal(
+            "error", "m", definition="distance of the tip from the circle's centre at the offset"
+        ),
+        Signal("error_along", "m", definition="error along the task axis, positive for too far"),
+        Signal("error_across", "m", definition="error across the task axis"),
+        Signal(
+            "error_bound",
+            "m",
+            definition="largest error that the end rule allows; NaN where it allows any",
+        ),
+        Signal("path_length", "m", definition="length of the tip's path from onset to offset"),
+        Signal("peak_speed", "m/s", definition="largest speed of the tip in the trial"),
     )
 
     condition_units = {  # noqa: RUF012 - a constant of the class, as its signals are

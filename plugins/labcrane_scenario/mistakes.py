@@ -42,8 +42,14 @@ class ContactEpisode:
         return False
 
 
-KINDS = ("object", "body", "overload_max", "overload_min", "drop")
-"""Mistakes of these kinds are counted, each for itself."""
+KINDS = {
+    "object": "contacts with an object beyond the allowed force",
+    "body": "contacts with the body beyond the allowed force",
+    "overload_max": "times that a joint was overloaded in its positive direction",
+    "overload_min": "times that a joint was overloaded in its negative direction",
+    "drop": "times that something slipped out of the jaws or was let go from too high",
+}
+"""Mistakes of these kinds are counted, each for itself; what counts as one."""
 
 
 @dataclass

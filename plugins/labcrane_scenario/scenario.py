@@ -36,20 +36,41 @@ class Scenario(Task):
         Signal("target.touch", "1"),
         Signal("goals.reached", "1"),
         Signal("deformity.distance", "m"),
-        Signal("mistakes", "1", KINDS),
+        Signal("mistakes", "1", tuple(KINDS)),
     )
 
     results = (
-        Signal("time", "s"),
-        Signal("goals", "1"),
-        *(Signal(f"n_{kind}", "1") for kind in KINDS),
-        Signal("peak_force.object", "N"),
-        Signal("peak_force.body", "N"),
-        Signal("deformity_found", "s"),  # from the start; NaN when it was not, or there is none
-        Signal("deformity", "1"),  # whether there is one; NaN where the scene never has one
-        Signal("found", "1"),  # whether it was reported; 0 where there is none, NaN as above
-        Signal("false_reports", "1"),  # reports of none, or from too far away
-        Signal("k", "1"),  # completion, as far as the run can tell; the supervisor's overrides it
+        Signal("time", "s", definition="from the trial's start to its end"),
+        Signal("goals", "1", definition="goals that were reached"),
+        *(Signal(f"n_{kind}", "1", definition=each) for kind, each in KINDS.items()),
+        Signal("peak_force.object", "N", definition="largest force on an object"),
+        Signal("peak_force.body", "N", definition="largest force on the body"),
+        Signal(
+            "deformity_found",
+            "s",
+            definition="from the trial's start to the report of the deformity; NaN without one",
+        ),
+        Signal(
+            "deformity",
+            "1",
+            definition="1 where there is a deformity, else 0; NaN where the scene never has one",
+        ),
+        Signal(
+            "found",
+            "1",
+            definition="1 where it was reported, else 0; NaN where the scene never has one",
+        ),
+        Signal(
+            "false_reports",
+            "1",
+            definition="reports where there is no deformity, or from too far away",
+        ),
+        Signal(
+            "k",
+            "1",
+            definition="1 where all goals were reached, else 0; the supervisor's completion "
+            "overrides it",
+        ),
     )
 
     reports = (DEFORMITY,)

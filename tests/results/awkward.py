@@ -120,6 +120,14 @@ class Awkward:
         self.data = self.lab.places.root
         self.cohort = find_cohort(self.data, [Status.HALF_FINISHED])
 
+    def report(self) -> Path:
+        """Return the folder of a report on everybody."""
+        folder = self.lab.folder / "report"
+        if not folder.exists():
+            words = ["report", str(self.data), "--out", str(folder)]
+            assert main([*words, "--include", "half-finished"]) == 0
+        return folder
+
     def export(self, to: str) -> Path:
         """Return the folder of an export of everybody."""
         folder = self.lab.folder / "exports" / to

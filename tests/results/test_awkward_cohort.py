@@ -4,12 +4,16 @@ import json
 import shutil
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import loadmat, savemat
 
+import labcrane
 from labcrane.analysis.measures import measures_of
+from labcrane.approval.codebook import codebook
+from labcrane.cli.app import main
 from results.awkward import ANSWERS, FORMULA, HALF_FINISHED, NULL, Awkward
 from results.consumers import needs_octave, octave, table
 from results.test_bids import errors, validated
@@ -56,6 +60,36 @@ def test_octave_refuses_people_of_two_studies(awkward: Awkward, tmp_path: Path) 
     caught = "try; read_labcrane(argument); catch e; disp(e.message); end"
     said = octave(f"addpath(argument); {caught}", tmp_path)
     assert "P001 is of the study 'rehearsal' and P001 of 'another'; read each study" in said
+
+
+def test_a_result_has_one_definition_wherever_it_is_read(
+    awkward: Awkward, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    task = awkward.lab.study.tasks["aiming"]
+    defined = {signal.name: signal.definition for signal in task.results}
+    assert "movement time of Dreger et al." in defined["circle_to_circle"]
+    book = pd.read_csv(awkward.export("tables") / "codebook.csv").query("table == 'trials'")
+    told = book.set_index("column")["description"].to_dict()
+    assert defined == {name: told[name] for name in defined}
+    approved = {each.name: each.definition for each in codebook(awkward.lab.study)}
+    assert defined == {name: approved[name] for name in defined}
+    with h5py.File(awkward.data / "P001" / "P001.h5") as file:
+        trials = file["ses-01/trials"]
+        assert defined == {name: trials[name].attrs["definition"] for name in defined}
+    described = json.loads((awkward.export("psychds") / "dataset_description.json").read_text(
+        encoding="utf-8"))["variableMeasured"]  # fmt: skip
+    told = {each["name"]: each["description"].rpartition("; ")[0] for each in described}
+    assert defined.items() <= told.items()
+    listed = pd.read_csv(awkward.report() / "tables" / "definitions.csv").set_index("measure")
+    assert defined.items() <= listed["meaning"].to_dict().items()
+    capsys.readouterr()
+    assert main(["plugins", "show", "aiming", "--json"]) == 0
+    (shown,) = json.loads(capsys.readouterr().out)
+    said = {each["column"]: each["definition"] for each in shown["recorded"]}
+    assert defined.items() <= said.items()
+    reference = (Path(labcrane.__file__).parents[1] / "docs" / "reference" / "task.md").read_text(
+        encoding="utf-8")  # fmt: skip
+    assert all(definition in reference for definition in defined.values())
 
 
 @validated

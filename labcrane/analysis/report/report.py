@@ -125,7 +125,7 @@ def write_report(
     page.heading("Definitions")
     page.say(f"Settings of the measures: {settings.as_dict()}")
     page.say(_by_which_rule(everything))
-    page.table("definitions", _definitions())
+    page.table("definitions", _definitions(cohort, everything))
     everything.to_csv(folder / "tables" / "movements.csv", index=False)
     return page.write()
 
@@ -495,10 +495,21 @@ def _by_which_rule(everything: "pd.DataFrame") -> str:
     )
 
 
-def _definitions() -> "pd.DataFrame":
+def _definitions(cohort: Cohort, everything: "pd.DataFrame") -> "pd.DataFrame":
+    """Return unit and meaning of the measures, and of what the sessions recorded of each trial."""
     import pandas as pd
 
+    units: dict[str, str] = {}
+    recorded: dict[str, str] = {}
+    for person in cohort.included:
+        units |= person.context.get("trial_units", {})
+        recorded |= person.context.get("trial_definitions", {})
     rows = [(name, unit, meaning) for name, (unit, meaning) in MEASURES.items()]
+    rows += [
+        (name, units.get(name, ""), recorded[name])
+        for name in map(str, everything)
+        if name in recorded and name not in MEASURES
+    ]
     return pd.DataFrame(rows, columns=["measure", "unit", "meaning"])
 
 

@@ -130,9 +130,10 @@ def _print(sheet: "OfferSheet") -> None:
     if sheet.recorded is None:
         out.print("what it records depends on settings without a default, or on the machine")
     elif sheet.recorded:
-        table = whole_table("records", "unit", "how often")
+        table = whole_table("records", "unit", "how often", "definition")
         for column in sheet.recorded:
-            table.add_row(*map(_literal, (column.column, column.unit, column.where)))
+            row = (column.column, column.unit, column.where, column.definition)
+            table.add_row(*map(_literal, row))
         out.print(table)
     out.print(f"\n{sheet.example}\n", markup=False)
 

@@ -166,10 +166,12 @@ def _set_after(log: SessionLog) -> dict[tuple[object, object], int]:
 def _write_trials(group: "h5py.Group", log: SessionLog) -> None:
     rows = _trial_rows(log)
     units = log.context.get("trial_units", {})
+    definitions = log.context.get("trial_definitions", {})
     columns = list(dict.fromkeys(name for row in rows for name in row if name != COUNTED))
     for number, (name, safe) in enumerate(node_names(columns)):
         write_values(group, safe, [row.get(name) for row in rows], units.get(name))
-        write_attributes(group[safe], {"name": name, "position": number})
+        about = {"definition": definitions[name]} if name in definitions else {}
+        write_attributes(group[safe], {"name": name, "position": number, **about})
 
 
 def write_sync_report(group: "h5py.Group", report: Mapping[str, Any]) -> None:

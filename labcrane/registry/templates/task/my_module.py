@@ -31,7 +31,7 @@ class MyPart(Task):
     # What is shown every tick: views, sounds and simulated operators look for these two.
     signals = (Signal("target.position", "m", ("x", "y", "z")), Signal("target.radius", "m"))
     # What a finished trial is measured by.
-    results = (Signal("duration", "s"),)
+    results = (Signal("duration", "s", definition="from the start of the trial to its end"),)
     condition_units = {"height": "m"}  # noqa: RUF012 - a constant of the class, as signals are
 
     def __init__(self, settings: MyPartSettings) -> None:
