@@ -116,7 +116,7 @@ class Cohort:
         kept = tuple(person for person in self.included if person.name != name)
         left_out = tuple(sorted((*self.left_out, *gone), key=lambda person: person.name))
         if not kept:
-            raise RecordingError(_nobody(self.folder, left_out) + f"; {name}: {why}")
+            raise RecordingError(_nobody(self.folder, left_out))
         return Cohort(self.folder, kept, left_out)
 
     @property
@@ -206,10 +206,11 @@ def _nobody(folder: Path, left_out: Sequence[Participant]) -> str:
         return f"there is no participant in {folder}; give the folder that holds P001/P001.h5"
     counts = {str(s): sum(p.status is s for p in left_out) for s in Status}
     found = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
-    return (
-        f"nobody in {folder} can be used as asked: {found}; "
-        "include them by name: --include simulated"
-    )
+    remedies = [f"{p.name}: {p.why}" for p in left_out if p.status is Status.UNREADABLE]
+    asked = [f"--include {status}" for status in INCLUDABLE if counts[str(status)]]
+    if asked:
+        remedies.append(f"to use them as well: {' '.join(asked)}")
+    return "; ".join([f"nobody in {folder} can be used as asked: {found}", *remedies])
 
 
 def _is_participant(entry: Path) -> bool:

@@ -1,5 +1,6 @@
 """Who counts, and who is listed instead."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -51,8 +52,18 @@ def test_a_folder_without_anybody_to_use_says_what_is_in_it(tmp_path: Path) -> N
     with pytest.raises(RecordingError, match=r"there is no data folder .*; give the study's"):
         find_cohort(tmp_path / "nowhere")
     erased = {"P001": (Status.ERASED, "on 2026-05-01: withdrew")}
-    with pytest.raises(RecordingError, match="can be used as asked: 1 erased; include them"):
+    with pytest.raises(RecordingError, match=r"can be used as asked: 1 erased$"):
         find_cohort(tmp_path, struck=erased)
+
+
+def test_nobody_to_use_names_what_would_help(data: Path, tmp_path: Path) -> None:
+    shutil.copytree(data / "P007", tmp_path / "P007")
+    with pytest.raises(RecordingError, match=r"labcrane recover .*P007 makes one") as refused:
+        find_cohort(tmp_path)
+    assert "--include" not in str(refused.value)
+    shutil.copytree(data / "P003", tmp_path / "P003")
+    with pytest.raises(RecordingError, match=r"recover .*: --include half-finished$"):
+        find_cohort(tmp_path)
 
 
 def test_an_excluded_participant_is_listed_with_the_reason_and_not_used(data: Path) -> None:
