@@ -6,6 +6,7 @@ from .electrodes.mne import EEG_READERS, channel_types, eeg_streams, events_at, 
 from .electrodes.sampled import Sampled, sampled
 from .exporter import Exporter
 from .gaze import fixations_of, with_unseen_areas
+from .gaze_streams import gaze_space
 from .measures import measures_of
 from .movements import Movement, events_of, movements_of
 from .questionnaires import answers_of, asked_in, beside_trials, scores_of
@@ -30,6 +31,7 @@ __all__ = [
     "events_of",
     "find_cohort",
     "fixations_of",
+    "gaze_space",
     "measures_of",
     "movements_of",
     "open_dataset",

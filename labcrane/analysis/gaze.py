@@ -4,7 +4,7 @@ A gaze stream is a stream of LSL type ``Gaze`` with a channel labelled ``aoi``: 
 name of the area of interest that is looked at, or its number from 1; an empty text or 0 for none,
 NaN for a blink. A source that knows only where in the window it is looked at, in pixels, is joined
 to the areas that a view recorded with its pictures (``labcrane.feedback.NAME.areas``):
-:func:`looks_on_screen`.
+:func:`looks_on_screen`. Which stream is measured, :mod:`~labcrane.analysis.gaze_streams` says.
 """
 
 import math
@@ -17,19 +17,17 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.analysis.cohort import Participant
+from labcrane.analysis.gaze_streams import CHANNEL, gaze_stream, place, window_stream
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
 
-KIND, CHANNEL = "Gaze", "aoi"
 AREAS = ".areas"
 SIDES = ("left", "top", "right", "bottom")
 ROUNDING_S = 1e-9
 """Samples that hold for as long as a look lasts make one."""
-
-PIXELS = frozenset({"px", "pixel", "pixels"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,8 +99,8 @@ class Looks:
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
 
 
-def looks(session: SessionRecord, delay_s: float = 0.0) -> Looks | None:
-    """Return what a session's gaze stream says, or None when it has none.
+def looks(session: SessionRecord, delay_s: float = 0.0, stream: str = "") -> Looks | None:
+    """Return what a session's gaze stream says, or None when it has none that can be measured.
 
     Parameters
     ----------
@@ -111,18 +109,20 @@ def looks(session: SessionRecord, delay_s: float = 0.0) -> Looks | None:
     delay_s
         Of the display, for a stream that says where in the window it is looked at: as in
         :func:`looks_on_screen`. With 0, a picture is seen as soon as it is handed to the screen.
+    stream
+        Name of the gaze stream; the only one by default.
     """
-    streams = session.streams.values()
-    for stream in streams:
-        if stream.attrs.get("type") == KIND and CHANNEL in stream.units:
-            values = stream.values([CHANNEL])[CHANNEL].tolist()
-            names = {value: area_name(value) for value in set(values)}  # each name is kept once
-            found = [names[value] for value in values]
-            tracked = np.array([not _is_lost(value) for value in values], bool)
-            return Looks(stream.time, found, tracked, sorted({*names.values()} - {""}))
-    gaze = next((each for each in streams if each.attrs.get("type") == KIND and place(each)), None)
-    pictures = next((each for each in streams if each.name.endswith(AREAS)), None)
-    if gaze is None or pictures is None or not (columns := area_columns(pictures)):
+    gaze = gaze_stream(session, stream)
+    if gaze is None:
+        return None
+    if CHANNEL in gaze.units:
+        values = gaze.values([CHANNEL])[CHANNEL].tolist()
+        names = {value: area_name(value) for value in set(values)}  # each name is kept once
+        found = [names[value] for value in values]
+        tracked = np.array([not _is_lost(value) for value in values], bool)
+        return Looks(gaze.time, found, tracked, sorted({*names.values()} - {""}))
+    pictures = next((one for one in session.streams.values() if one.name.endswith(AREAS)), None)
+    if pictures is None or not (columns := area_columns(pictures)):
         return None
     where = gaze.values(place(gaze))
     boxes = pictures.values([column for four in columns.values() for column in four])
@@ -133,14 +133,6 @@ def looks(session: SessionRecord, delay_s: float = 0.0) -> Looks | None:
     }
     spots = np.column_stack([where[name] for name in place(gaze)]).astype(np.float64)
     return looks_on_screen(gaze.time, spots, pictures.time, areas, delay_s)
-
-
-def place(gaze: Stream) -> tuple[str, ...]:
-    """Return the columns of a place in the window, x and y in pixels; nothing where none are."""
-    in_window = [name for name, unit in gaze.units.items() if unit.lower() in PIXELS]
-    across = [name for name in in_window if name.lower().endswith("x")]
-    down = [name for name in in_window if name.lower().endswith("y")]
-    return (across[0], down[0]) if across and down else ()
 
 
 def area_columns(pictures: Stream) -> dict[str, tuple[str, ...]]:
@@ -350,8 +342,8 @@ def fixations(session: SessionRecord, settled_s: float = SETTLED_S) -> "pd.DataF
     1; ``time`` on our clock, in seconds; ``right_deg``, ``down_deg``, ``deg`` and ``spread_deg`` as
     in :class:`Drift`, NaN where nobody said how large the picture is, or how far the eye;
     ``right_px`` and ``down_px``, the median offset in pixels; ``valid``, the share of samples that
-    are numbers. No row without a gaze stream that says where in the window somebody looks, in
-    pixels, or without an operator's view.
+    are numbers. No row without an operator's view, or without one gaze stream alone that says where
+    in the window somebody looks, in pixels.
 
     Parameters
     ----------
@@ -362,8 +354,7 @@ def fixations(session: SessionRecord, settled_s: float = SETTLED_S) -> "pd.DataF
     """
     import pandas as pd
 
-    kind = [each for each in session.streams.values() if each.attrs.get("type") == KIND]
-    gaze = next((each for each in kind if place(each)), None)
+    gaze = window_stream(session)
     shown = list(_shown(session))
     rows = []
     if gaze is not None and shown:

@@ -64,6 +64,8 @@ class MeasureSettings:
     display_delay_s
         From handing a picture to the screen to its light, in seconds, as ``labcrane doctor
         --display`` measures it: which picture was looked at.
+    gaze_stream
+        Name of the gaze stream, where a session has several that could be measured.
     """
 
     dead_zone: float = 0.05
@@ -77,6 +79,7 @@ class MeasureSettings:
     lag_most_s: float = 0.5
     look_least_s: float = 0.066
     display_delay_s: float = 0.0
+    gaze_stream: str = ""
 
     def as_dict(self) -> dict[str, object]:
         """Return the settings by name, ready for JSON."""
@@ -157,7 +160,7 @@ def measure_session(
         return trials
     machine = machine_of(session)
     rate_hz = float(session.attrs["rate_hz"])
-    seen = looks(session, settings.display_delay_s)
+    seen = looks(session, settings.display_delay_s, settings.gaze_stream)
     rows, recorded = [], []
     for each in cut(frames, trials, rate_hz) if frames else movements_of(session):
         movement = by_todays_rule(each, session)

@@ -181,6 +181,7 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_orders_of_steps(study)
     yield from _of_fading(study)
     yield from _of_streams(study)
+    yield from _of_gaze(study)
     yield from _of_limits(study)
     yield from _of_repeats(study)
     yield from _of_pattern(study)
@@ -787,6 +788,26 @@ def _of_streams(study: Study) -> Doubts:
                 "network fits, a neighbour's as well, and each run asks which one is meant; give "
                 "the source_id or the name that labcrane streams shows",
             )
+
+
+def _of_gaze(study: Study) -> Doubts:
+    """Question gaze of which nothing can be measured: in no known space, or of two trackers."""
+    needs = study.protocol.streams
+    for label, need in needs.items():
+        if "gaze" in f"{need.type} {need.name}".lower() and need.space is None:
+            yield (
+                ("streams", label, "space"),
+                f"streams: {label} does not say what its pixels are of, and without a "
+                "coordinate_system in its header no gaze is measured by it; write space: screen "
+                "for the participant's window, or space: scene for a head-mounted tracker's camera",
+            )
+    shown = [label for label, need in needs.items() if need.space == "screen"]
+    if len(shown) > 1:
+        yield (
+            ("streams", shown[1], "space"),
+            f"streams: {' and '.join(shown)} are all places in the participant's window, so that "
+            "a report measures gaze by none of them",
+        )
 
 
 def _of_stop_rules(study: Study) -> Doubts:

@@ -53,6 +53,11 @@ class StreamNeed(Settings):
     """Fixed latency of the device, in seconds, as measured or stated by its maker; subtracted from
     its times. What the stream's own header states holds by default."""
 
+    space: Literal["screen", "scene"] | None = None
+    """What the pixels of a gaze stream are of: the participant's window (``screen``), or the scene
+    camera of a head-mounted tracker (``scene``), by which no area is looked at. What the stream's
+    own header states holds by default; where it states nothing, no gaze is measured."""
+
     min_delay_s: Annotated[NonNegativeFloat | None, Usual(1e-5, 2.0)] = None
     """For a device whose samples are stamped when they are sent: the shortest time from sampling to
     stamping, in seconds. It cannot be observed. Without it, stamps are taken to scatter evenly

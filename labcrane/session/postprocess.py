@@ -1,8 +1,9 @@
 """Postprocessing of a session in its participant file: corrected clocks, and the sync report."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from labcrane.errors import LabcraneError
 from labcrane.protocol.streams import StreamNeed, TimeLimits
 from labcrane.recording.foreign_streams import RecordedStream
-from labcrane.recording.participant_file.columns import text_of
+from labcrane.recording.participant_file.columns import text_of, write_attributes
 from labcrane.recording.participant_file.recorrect import read_channel, read_stream
 from labcrane.recording.participant_file.session_group import write_sync_report
 from labcrane.recording.participant_file.stream_group import write_time, write_uncorrected
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
     import h5py
 
 
+NO_SPACES: Mapping[str, str] = MappingProxyType({})
+
+
 @dataclass(frozen=True, slots=True)
 class _Read:
     """A stream as the file holds it, and what the study says of it."""
@@ -42,10 +46,15 @@ class _Read:
     need: StreamNeed | None
 
 
-def conclude(group: "h5py.Group") -> SyncReport:
+def conclude(group: "h5py.Group", spaces: Mapping[str, str] = NO_SPACES) -> SyncReport:
     """Correct and judge the streams of a session, by its protocol, from its group in the file.
 
     May be repeated for ever: nothing recorded is altered, and earlier times are kept.
+
+    Parameters
+    ----------
+    spaces
+        What gaze streams are in, by the names of their groups, as somebody declares it afterwards.
     """
     context = json.loads(text_of(group["context"]))
     needs = {
@@ -55,6 +64,8 @@ def conclude(group: "h5py.Group") -> SyncReport:
     streams = [_read(one, needs) for one in group.get("streams", {}).values()]
     raws = pooled([one.raw for one in streams], [one.recorded.header.host for one in streams])
     end = _end(group, raws)
+    for one in streams:
+        _write_space(one, spaces)
     judged = [_corrected(one, raw, end, limits) for one, raw in zip(streams, raws, strict=True)]
     came = {one.label for one in streams}
     missing = {label: need.required for label, need in needs.items() if label not in came}
@@ -101,6 +112,15 @@ def _corrected(one: _Read, raw: RawStream, end: float | None, limits: Limits) ->
     write_time(one.group, columns_of(corrected), quality_of(corrected, treatment))
     required = one.need is None or one.need.required
     return judge_stream(one.recorded, corrected.quality, limits, required=required)
+
+
+def _write_space(one: _Read, spaces: Mapping[str, str]) -> None:
+    """Write what a gaze stream is in, where somebody says it; what was said last holds."""
+    said = spaces.get(one.group.name.rpartition("/")[2])
+    if said is None and "space" not in one.group.attrs and one.need is not None:
+        said = one.need.space
+    if said is not None:
+        write_attributes(one.group, {"space": said})
 
 
 def _treatment(one: _Read) -> Treatment:

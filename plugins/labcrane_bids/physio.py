@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from labcrane import FloatArray
-from labcrane.analysis import eeg_streams
+from labcrane.analysis import eeg_streams, gaze_space
 from labcrane.recording import SessionRecord, Stream
 from labcrane_bids.files import MISSING, ROWS, first_tick, label
 from labcrane_bids.settings import BidsSettings
@@ -22,11 +22,13 @@ KNOWN = {
 
 SYSTEMS = {
     "m": "gaze-in-world", "cm": "gaze-in-world", "mm": "gaze-in-world", "meters": "gaze-in-world",
-    "pixel": "gaze-on-screen", "pixels": "gaze-on-screen", "px": "gaze-on-screen",
-    "normalized": "gaze-on-screen", "rad": "eye-in-head", "deg": "eye-in-head",
-    "degrees": "eye-in-head",
+    "rad": "eye-in-head", "deg": "eye-in-head", "degrees": "eye-in-head",
 }  # fmt: skip
 """Coordinate system of gaze, by the unit of its x: what is in metres is in the world."""
+
+SPACES = {"screen": "gaze-on-screen", "scene": "eye-in-head"}
+"""Coordinate system of pixels and shares of a picture, by whose picture it is: a scene camera moves
+with the head."""
 
 
 def continuous_recordings(
@@ -89,7 +91,8 @@ def _recording(
     if gaze:
         unit = stream.units.get("x", "").lower()
         about["RecordedEye"] = "cyclopean"
-        about["SampleCoordinateSystem"] = settings.gaze_system or SYSTEMS.get(unit) or MISSING
+        by_unit = SYSTEMS.get(unit) or SPACES.get(gaze_space(stream))
+        about["SampleCoordinateSystem"] = settings.gaze_system or by_unit or MISSING
     units = ["s", *(stream.units[name] or "arbitrary" for name in labels)]
     for column, unit in zip(columns, units, strict=True):
         about[column] = {"Description": column.replace("_", " "), "Units": unit}

@@ -38,7 +38,8 @@ class BidsSettings(Settings):
     of the same name that says what its columns are."""
 
     gaze_system: str = ""
-    """What gaze is measured in, as ``gaze-on-screen``; by default as the unit of x says."""
+    """What gaze is measured in, as ``gaze-on-screen``; by default as the unit of x says, and of
+    pixels what the protocol or the stream's header says that they are of."""
 
     eeg_reference: str = ""
     """Where the reference electrode of EEG was, as in ``FCz``."""

@@ -172,6 +172,9 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
         ([("sessions:", "triggers: {a: {use: serial_ttl, port: COM3, codes: {trial.start: 1, trial.end: 1}}}\nsessions:")], "triggers.a.codes", "which nobody tells apart"),
         ([("sessions:", "triggers: {a: {use: serial_ttl, port: COM3}, b: {use: serial_ttl, port: COM3}}\nsessions:")], "triggers.b", "both write to port COM3"),
         ([("sessions:", "streams: {gaze: {name: Neon, latency_s: 40}}\nsessions:")], "streams.gaze.latency_s", "a latency of 40 s"),
+        ([("sessions:", "streams: {g: {name: Neon Gaze}}\nsessions:")], "streams.g.space", "does not say what its pixels are of"),
+        ([("sessions:", "streams: {g: {name: G, type: Gaze}}\nsessions:")], "streams.g.space", "write space: screen"),
+        ([("sessions:", "streams: {g: {name: G, space: screen}, h: {name: H, space: screen}}\nsessions:")], "streams.h.space", "g and h are all places"),
         ([("sessions:", "streams: {eeg: {type: EEG}, gaze: {name: Neon}}\nsessions:")],
          "streams.eeg", "each run asks which one is meant; give the source_id"),
     ],
@@ -291,7 +294,12 @@ def test_a_part_is_asked_about_where_plans_of_participants_hold_other_levels(
 
 
 @pytest.mark.parametrize(
-    "need", ["{name: Neon, type: Gaze}", "{source_id: neon-7}", "{type: Gaze, several: true}"]
+    "need",
+    [
+        "{name: Neon, type: Gaze, space: scene}",
+        "{source_id: neon-7}",
+        "{type: Gaze, several: true, space: screen}",
+    ],
 )
 def test_a_stream_that_can_be_no_neighbours_is_not_asked_about(tmp_path: Path, need: str) -> None:
     asked = questions(a_study(tmp_path, ("sessions:", f"streams: {{gaze: {need}}}\nsessions:")))

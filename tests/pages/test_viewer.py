@@ -71,7 +71,8 @@ def gazed(file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     def write(session: h5py.Group, name: str, kind: str, rate_hz: float, columns: dict) -> None:
         stream = session.create_group(f"streams/{name}")
-        write_attributes(stream, {"name": name, "type": kind, "rate_hz": rate_hz})
+        about = {"name": name, "type": kind, "rate_hz": rate_hz, "space": "screen"}
+        write_attributes(stream, about)
         for column in ("time_raw", "time"):
             write_numbers(stream, column, columns["time"], "s")
         data = stream.create_group("data")

@@ -67,13 +67,15 @@ def record(
     pilot: bool = False,
     orders: Mapping[int, Sequence[Command]] | None = None,
     gaze: bool | Sequence[str] | Callable[[FloatArray], FloatArray] = False,
+    stated: Sequence[str] = ("screen",),
     eeg: bool = False,
 ) -> Path:
     """Record session 1; a program takes the controls, whatever the stamps say.
 
     ``gaze`` is of eyes that name what they look at; or, by the names of cameras, of eyes that look
     somewhere in the window, beside the areas that a view has shown there; or, as a function of
-    times on the session's clock, of eyes whose place in the window is known, in pixels.
+    times on the session's clock, of eyes whose place in the window is known, in pixels. ``stated``
+    has the coordinate system that the header of each stream in pixels states.
     """
     visit = Visit(chosen, participant, 1, data, simulated=simulated, fast=True, pilot=pilot)
     plan = plan_session(chosen, participant, 1)
@@ -95,7 +97,7 @@ def record(
             elif callable(gaze):
                 _gaze_at(writer, clock.now(), gaze)
             elif gaze:
-                _gaze_in_window(writer, clock.now(), gaze)
+                _gaze_in_window(writer, clock.now(), gaze, stated)
             if eeg:
                 events = read_xdf(visit.journal).stream(EVENTS).stamps
                 _eeg(writer, clock.now(), events)
@@ -116,18 +118,27 @@ def _gaze(writer: XdfWriter, until: float) -> None:
     _stream(writer, header, time, OFFSET_S, data)
 
 
-def _gaze_in_window(writer: XdfWriter, until: float, cameras: Sequence[str]) -> None:
+def in_pixels(stated: str) -> tuple[Channel, ...]:
+    """Return the channels of gaze in pixels, of what the header states."""
+    extra = {"coordinate_system": stated} if stated else {}
+    return tuple(Channel(f"gaze_{axis}", "px", extra=extra) for axis in "xy")
+
+
+def _gaze_in_window(
+    writer: XdfWriter, until: float, cameras: Sequence[str], stated: Sequence[str]
+) -> None:
     """Write the same eyes by where they look, and two areas of each camera's picture at 60 Hz.
 
     What is looked at in the first half of each second is the target of the last camera, and
     otherwise nothing; for a while the target is out of the picture, and in it under the tip.
     """
-    px = (Channel("gaze_x", "px"), Channel("gaze_y", "px"))
-    header = StreamHeader("eyes", "Gaze", px, "double64", 50.0, source_id="eyes")
     time = np.arange(90.0, until, 0.02)
     on = time % 1.0 < 0.5
     x = np.where(on, 100.0 + 1000.0 * (len(cameras) - 1), 700.0)
-    _stream(writer, header, time, OFFSET_S, np.column_stack([x, np.full(len(time), 50.0)]))
+    spots = np.column_stack([x, np.full(len(time), 50.0)])
+    for name, said in zip(("eyes", "glasses"), stated, strict=False):
+        header = StreamHeader(name, "Gaze", in_pixels(said), "double64", 50.0, source_id=name)
+        _stream(writer, header, time, OFFSET_S, spots)
     boxes = []
     for at in range(len(cameras)):
         left = 1000.0 * at
@@ -147,8 +158,8 @@ def _gaze_in_window(writer: XdfWriter, until: float, cameras: Sequence[str]) -> 
 
 def _gaze_at(writer: XdfWriter, until: float, where: Callable[[FloatArray], FloatArray]) -> None:
     """Write eyes at 120 Hz by where in the window they look."""
-    px = (Channel("gaze_x", "px"), Channel("gaze_y", "px"))
-    header = StreamHeader("eyes", "Gaze", px, "double64", 120.0, source_id="eyes")
+    channels = in_pixels("screen")
+    header = StreamHeader("eyes", "Gaze", channels, "double64", 120.0, source_id="eyes")
     time = np.arange(90.0, until, 1.0 / 120.0)
     _stream(writer, header, time, OFFSET_S, where(time))
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Cohort, Participant, Status
 from labcrane.analysis.gaze import fixations_of, with_unseen_areas
+from labcrane.analysis.gaze_streams import unmeasured_of
 from labcrane.analysis.measures import DEFAULTS, MeasureSettings, measures_of
 from labcrane.analysis.parallel import work
 from labcrane.analysis.quality import (
@@ -95,7 +96,8 @@ def write_report(
         if progress is not None:
             progress(len(found), len(cohort.included))
     in_order = [found[participant.name] for participant in cohort.included]
-    movements, loops, syncs, answers, scores, thresholds, drifts = zip(*in_order, strict=True)
+    columns = zip(*in_order, strict=True)
+    movements, loops, syncs, answers, scores, thresholds, drifts, without = columns
     everything = with_unseen_areas(pd.concat(movements, ignore_index=True))
     page = Page(_title(cohort.included), folder / "report.html", folder)
     _stamp(page, [participant.status for participant in cohort.included])
@@ -113,6 +115,7 @@ def write_report(
         results = _study(page, everything, _joined(scores), groups, in_words(about), primary)
     add_thresholds(page, _joined(thresholds), judge)
     _drifts(page, _joined(drifts))
+    _unmeasured(page, _joined(without))
     page.heading("Loop and clocks")
     quality = pd.concat(loops, ignore_index=True), pd.concat(syncs, ignore_index=True)
     page.table("loop_quality", quality[0])
@@ -147,9 +150,9 @@ def _one(
 ) -> "tuple[str, str, *tuple[pd.DataFrame, ...]]":
     """Write one participant's page; return name and tables.
 
-    These are movements, quality of loop and of clocks, answers, scores, thresholds and drifts of
-    gaze. The second of what is returned is why the data cannot be used, and then the tables are
-    empty.
+    These are movements, quality of loop and of clocks, answers, scores, thresholds, drifts of gaze
+    and gaze that is not measured. The second of what is returned is why the data cannot be
+    used, and then the tables are empty.
     """
     import pandas as pd
 
@@ -159,13 +162,13 @@ def _one(
             if GROUP not in own:  # trials say it where the study has groups
                 own.insert(0, GROUP, str(participant.context.get("group", "")))
             asked = (answers_of(participant), scores_of(participant), thresholds_of(participant))
-            drifts = fixations_of(participant)
+            gaze = fixations_of(participant), unmeasured_of(participant)
             loop, sync = loop_quality(participant), sync_quality(participant)
             _participant_page(participant, own, loop, sync, folder)
     except (LabcraneError, *DAMAGED) as error:  # one recording never stops a cohort
         nothing = pd.DataFrame()
-        return participant.name, _words(error), *([nothing] * 7)
-    return participant.name, "", own, loop, sync, *asked, drifts
+        return participant.name, _words(error), *([nothing] * 8)
+    return participant.name, "", own, loop, sync, *asked, *gaze
 
 
 def _words(error: Exception) -> str:
@@ -455,6 +458,15 @@ def _drifts(page: Page, looked: "pd.DataFrame") -> None:
             valid=("valid", "min"),
         ),
     )
+
+
+def _unmeasured(page: Page, streams: "pd.DataFrame") -> None:
+    """Add the gaze that was recorded, and by which nothing is measured."""
+    if not len(streams):
+        return
+    page.heading("Gaze that is not measured")
+    page.say("These streams were recorded whole, and no measure is of them:")
+    page.table("unmeasured_gaze", streams)
 
 
 def _mixed(page: Page, results: "pd.DataFrame", measure: str) -> None:

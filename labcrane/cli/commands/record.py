@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,7 +10,7 @@ import typer
 
 from labcrane.cli.options import Local, stay_on_this_computer
 from labcrane.cli.output import out
-from labcrane.errors import ProtocolError, RecordingError
+from labcrane.errors import ProtocolError, RecordingError, nearest
 
 if TYPE_CHECKING:
     from labcrane.monitoring.config import MonitorBuilder
@@ -227,6 +227,10 @@ def _recover(folder: Path) -> None:
 
 def resync(
     file: Annotated[Path, typer.Argument(help="a participant file, or anybody's XDF file")],
+    space: Annotated[
+        list[str] | None,
+        typer.Option(metavar="STREAM=screen|scene", help="declare what gaze in pixels is of"),
+    ] = None,
 ) -> None:
     """Correct the clocks of a participant file's streams again, or those of any XDF file."""
     if file.suffix.lower() == ".xdfz":
@@ -234,13 +238,39 @@ def resync(
             f"{file} is packed: unpack it into an .xdf file first (gunzip -S .xdfz)"
         )
     if file.suffix.lower() == ".xdf":
+        if space:
+            raise RecordingError("--space is for participant files; gaze of an XDF is not measured")
         _resync_xdf(file)
         return
+    from functools import partial
+
     from labcrane.recording.participant_file.recorrect import recorrect
     from labcrane.session.postprocess import conclude
 
-    for session, names in recorrect(file, conclude).items():
+    declared = _spaces(file, space or ())
+    for session, names in recorrect(file, partial(conclude, spaces=declared)).items():
         out.print(f"session {session}: {', '.join(names) or 'no streams'}", markup=False)
+
+
+def _spaces(file: Path, declared: Sequence[str]) -> dict[str, str]:
+    """Return what ``STREAM=SPACE`` says of streams that the file has."""
+    from labcrane.analysis.gaze_streams import KIND, SCENE, SCREEN
+    from labcrane.recording.participant_file.reader import open_recording
+
+    spaces = dict(each.rpartition("=")[::2] for each in declared)
+    record = open_recording(file)
+    streams = [each for n in record.sessions for each in record.session(n).streams.values()]
+    there = list(dict.fromkeys(each.name for each in streams if each.attrs.get("type") == KIND))
+    for name, said in spaces.items():
+        if said not in {SCREEN, SCENE}:
+            raise RecordingError(
+                f"--space {name}={said}: gaze is in pixels of the participant's window "
+                f"({SCREEN}) or of a scene camera ({SCENE})"
+            )
+        if name not in there:
+            told = nearest(name, there, "there is")
+            raise RecordingError(f"--space: {file} has no gaze stream {name!r}; {told}")
+    return spaces
 
 
 def _resync_xdf(file: Path) -> None:

@@ -54,7 +54,7 @@ def recorrect(path: Path, conclude: Conclude) -> dict[int, list[str]]:
 
 _TIMES = "|".join(TIME_COLUMNS)
 _CORRECTED = re.compile(
-    rf"ses-\d+/(sync_report|streams/[^/]+(@uncorrected|/({_TIMES}|earlier)([/@].*)?))"
+    rf"ses-\d+/(sync_report|streams/[^/]+(@uncorrected|@space|/({_TIMES}|earlier)([/@].*)?))"
 )
 
 

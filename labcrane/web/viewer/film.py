@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from labcrane.analysis.gaze_streams import unmeasured
 from labcrane.core.records import Event, Run, SessionState
 from labcrane.core.roles import Cue
 from labcrane.core.settings import Settings
@@ -231,6 +232,11 @@ class Film:
     def glances(self) -> Glances:
         """Where somebody looked, if that was recorded."""
         return Glances(self._record, self.start)
+
+    @cached_property
+    def unmeasured(self) -> list[tuple[str, str]]:
+        """Gaze streams of which it is not shown where somebody looked, and why."""
+        return unmeasured(self._record)
 
     @cached_property
     def signals(self) -> list[dict[str, str]]:

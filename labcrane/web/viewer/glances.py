@@ -1,9 +1,9 @@
 """Glances: where somebody looked, and at which area of the picture, at any time of a film.
 
-A gaze stream (type ``Gaze``) says it by a channel ``aoi``, or by a place in pixels; a view's stream
-of areas (``labcrane.feedback.NAME.areas``) says where things were in its picture. A picture is the
-one handed to the screen last: the display's own delay, which only ``labcrane doctor --display``
-measures, is not in it, and the page says so.
+A gaze stream (type ``Gaze``) says it by a channel ``aoi``, or by a place in the window; a view's
+stream of areas (``labcrane.feedback.NAME.areas``) says where things were in its picture. A picture
+is the one handed to the screen last: the display's own delay, which only ``labcrane doctor
+--display`` measures, is not in it, and the page says so.
 """
 
 import math
@@ -14,13 +14,11 @@ import numpy as np
 
 from labcrane.analysis.gaze import (
     AREAS,
-    CHANNEL,
-    KIND,
     area_columns,
     area_name,
     looks_on_screen,
-    place,
 )
+from labcrane.analysis.gaze_streams import CHANNEL, gaze_stream, place
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
 from labcrane.types import FloatArray
 
@@ -65,7 +63,7 @@ class Glances:
     def __init__(self, record: SessionRecord, start: float) -> None:
         self._start = start
         streams = record.streams.values()
-        self._gaze = next((one for one in streams if one.attrs.get("type") == KIND), None)
+        self._gaze = gaze_stream(record)
         self._pictures = next((one for one in streams if one.name.endswith(AREAS)), None)
         self._place = () if self._gaze is None else place(self._gaze)
         self._named = self._gaze is not None and CHANNEL in self._gaze.units

@@ -92,7 +92,7 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
         shapes = ShownShapes(cues)
         shapes.take(film.run)
         screens.append(Screen(film, shapes))
-        lacking += why
+        lacking += [*why, *(f"stream {name!r} {what}" for name, what in film.unmeasured)]
 
     def show(second: float) -> str:
         try:

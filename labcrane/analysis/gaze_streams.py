@@ -1,0 +1,133 @@
+"""Gaze streams of a session: which one is measured, and why others are not.
+
+A stream of LSL type ``Gaze`` is measured where a channel ``aoi`` names what is looked at, or where
+two channels in pixels say where in the participant's window. Pixels of a head-mounted tracker's
+scene camera look the same, so they are taken for the window's only where somebody says so: the
+protocol (``space``), ``labcrane resync --space``, or ``coordinate_system`` in the stream's header.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from labcrane.analysis.cohort import Participant
+from labcrane.errors import RecordingError, nearest
+from labcrane.recording.participant_file.reader import SessionRecord, Stream
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+KIND, CHANNEL = "Gaze", "aoi"
+PIXELS = frozenset({"px", "pixel", "pixels"})
+
+SCREEN, SCENE = "screen", "scene"
+WORDS = {"screen": SCREEN, "display": SCREEN, "monitor": SCREEN, "world": SCENE, "scene": SCENE}
+"""Spaces by the words with which headers state a coordinate system: ``world``, ``screen-space``."""
+
+UNMEASURED = ("participant", "session", "stream", "why")
+
+
+def gaze_stream(session: SessionRecord, name: str = "") -> Stream | None:
+    """Return the stream by which gaze is measured: one that names areas, else one in the window.
+
+    None where there is none, or where several would do: :func:`unmeasured` says which.
+
+    Parameters
+    ----------
+    name
+        Of the one that is meant; empty for the only one.
+
+    Raises
+    ------
+    RecordingError
+        Nothing can be measured by the stream of that name.
+    """
+    found = [each for each in _candidates(session) if name in ("", each.name)]
+    if name and not found:
+        there = nearest(name, [each.name for each in _candidates(session)], "there is")
+        raise RecordingError(f"gaze cannot be measured by a stream {name!r}; {there}")
+    return found[0] if len(found) == 1 else None
+
+
+def window_stream(session: SessionRecord, name: str = "") -> Stream | None:
+    """Return the stream that says where in the window somebody looks; None for none or several."""
+    found = [each for each in _gaze(session) if place(each) and name in ("", each.name)]
+    return found[0] if len(found) == 1 else None
+
+
+def place(gaze: Stream) -> tuple[str, ...]:
+    """Return the columns of a place in the window, x and y in pixels; nothing where none are.
+
+    Nothing either where nobody says that its pixels are the window's.
+    """
+    columns = _in_pixels(gaze)
+    return columns if columns and gaze_space(gaze) == SCREEN else ()
+
+
+def gaze_space(gaze: Stream) -> str:
+    """Return what a stream's places are in: ``screen``, ``scene``, or nothing where nobody says.
+
+    What was declared counts before what the header states.
+    """
+    if declared := gaze.attrs.get("space"):
+        return str(declared)
+    header = gaze.header
+    if header is None:
+        return ""
+    once = str(header.desc.get("coordinate_system", ""))
+    stated = " ".join([once, *(one.extra.get("coordinate_system", "") for one in header.channels)])
+    found = {WORDS[word] for word in re.findall("[a-z]+", stated.lower()) if word in WORDS}
+    return found.pop() if len(found) == 1 else ""
+
+
+def unmeasured(session: SessionRecord) -> list[tuple[str, str]]:
+    """Return the gaze streams by which nothing is measured, each with the reason and a way out."""
+    found = []
+    for each in _gaze(session):
+        if CHANNEL in each.units or not _in_pixels(each) or place(each):
+            continue
+        if gaze_space(each) == SCENE:
+            why = (
+                "is in pixels of a scene camera, which moves with the head, and not of the "
+                "participant's window; map it onto the window (docs/devices.md)"
+            )
+        else:
+            why = (
+                "is in pixels, and neither the protocol nor its header says of what; if they are "
+                "the participant's window's, declare it with labcrane resync FILE --space "
+                f"'{each.name}=screen', else '{each.name}=scene'"
+            )
+        found.append((each.name, why))
+    several = _candidates(session)
+    names = " and ".join(repr(each.name) for each in several)
+    why = f"could be measured as well as others: {names}; say which, by gaze_stream='NAME'"
+    return [*found, *((each.name, f"{why} of MeasureSettings") for each in several[1:] and several)]
+
+
+def unmeasured_of(participant: Participant) -> "pd.DataFrame":
+    """Return :func:`unmeasured` of all sessions: participant, session, stream, why."""
+    import pandas as pd
+
+    rows = [
+        (participant.name, number, *told)
+        for number, session in participant.sessions()
+        for told in unmeasured(session)
+    ]
+    return pd.DataFrame(rows, columns=list(UNMEASURED))
+
+
+def _gaze(session: SessionRecord) -> list[Stream]:
+    return [each for each in session.streams.values() if each.attrs.get("type") == KIND]
+
+
+def _candidates(session: SessionRecord) -> Sequence[Stream]:
+    """Return the streams that could be measured; those that name areas know more than others."""
+    named = [each for each in _gaze(session) if CHANNEL in each.units]
+    return named or [each for each in _gaze(session) if place(each)]
+
+
+def _in_pixels(gaze: Stream) -> tuple[str, ...]:
+    pixels = [name for name, unit in gaze.units.items() if unit.lower() in PIXELS]
+    across = [name for name in pixels if name.lower().endswith("x")]
+    down = [name for name in pixels if name.lower().endswith("y")]
+    return (across[0], down[0]) if across and down else ()

@@ -1,0 +1,142 @@
+"""Gaze in pixels is measured only where somebody says that they are the window's."""
+
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
+
+import pandas as pd
+import pytest
+
+from labcrane import RecordingError, open_recording
+from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis.gaze import looks
+from labcrane.analysis.gaze_streams import gaze_space, unmeasured, window_stream
+from labcrane.analysis.measures import MeasureSettings, measure_session
+from labcrane.analysis.report.report import write_report
+from labcrane.cli.app import main
+from labcrane.recording import SessionRecord, Stream
+from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.web.viewer.glances import Glances
+from results.recorded import record, study
+
+
+def resync(path: Path, *declared: str) -> int:
+    return main(["resync", str(path), *(word for each in declared for word in ("--space", each))])
+
+
+def first(path: Path) -> SessionRecord:
+    return open_recording(path).session(1)
+
+
+def glanced(session: SessionRecord) -> bool:
+    return Glances(session, session.streams["state"].time[0]).known
+
+
+@pytest.fixture(scope="module")
+def unstated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("unstated")
+    return record(study(folder), folder / "data", "P001", gaze=["cab"], stated=["", "world"])
+
+
+def test_pixels_of_which_nobody_says_of_what_are_measured_nowhere(unstated: Path) -> None:
+    session = first(unstated)
+    assert looks(session) is None
+    assert window_stream(session) is None
+    assert not glanced(session)
+    why = dict(unmeasured(session))
+    assert why["eyes"] == (
+        "is in pixels, and neither the protocol nor its header says of what; if they are the "
+        "participant's window's, declare it with labcrane resync FILE --space 'eyes=screen', else "
+        "'eyes=scene'"
+    )
+    assert why["glasses"].startswith("is in pixels of a scene camera, which moves with the head")
+
+
+@pytest.mark.slow
+def test_a_report_says_which_gaze_it_does_not_measure_and_how_to_declare_it(
+    unstated: Path, tmp_path: Path
+) -> None:
+    write_report(find_cohort(unstated.parents[1]), tmp_path)
+    told = pd.read_csv(tmp_path / "tables" / "unmeasured_gaze.csv")
+    assert told[["participant", "session", "stream"]].to_numpy().tolist() == [
+        ["P001", 1, "eyes"],
+        ["P001", 1, "glasses"],
+    ]
+    assert told["why"].tolist() == [why for _, why in unmeasured(first(unstated))]
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "labcrane resync FILE --space" in page
+    measured = pd.read_csv(tmp_path / "tables" / "movements.csv")
+    assert not [name for name in measured if name.startswith(("dwell_", "look_lead_"))]
+
+
+@pytest.mark.slow
+def test_what_pixels_are_of_can_be_declared_afterwards_and_taken_back(
+    unstated: Path, tmp_path: Path
+) -> None:
+    path = Path(shutil.copy(unstated, tmp_path / "P001.h5"))
+    resync(path, "eyes=screen")
+    session = first(path)
+    seen = looks(session)
+    assert seen is not None
+    assert "target" in set(seen.area)
+    assert glanced(session)
+    assert [name for name, _ in unmeasured(session)] == ["glasses"]
+    resync(path)
+    assert looks(first(path)) is not None, "a new correction keeps what was declared"
+    resync(path, "eyes=scene", "glasses=scene")
+    assert looks(first(path)) is None
+
+
+@pytest.mark.slow
+def test_of_two_streams_that_could_be_measured_none_is_until_one_is_named(
+    unstated: Path, tmp_path: Path
+) -> None:
+    path = Path(shutil.copy(unstated, tmp_path / "P001.h5"))
+    resync(path, "eyes=screen", "glasses=screen")
+    session = first(path)
+    assert looks(session) is None
+    assert [name for name, _ in unmeasured(session)] == ["eyes", "glasses"]
+    assert unmeasured(session)[0][1].startswith(
+        "could be measured as well as others: 'eyes' and 'glasses'; say which"
+    )
+    assert "dwell_during_target" in measure_session(session, MeasureSettings(gaze_stream="eyes"))
+    with pytest.raises(RecordingError, match=r"by a stream 'eye'; did you mean 'eyes'\? there"):
+        looks(session, stream="eye")
+
+
+def test_a_declaration_that_cannot_be_is_refused_and_changes_nothing(
+    unstated: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = unstated.read_bytes()
+    assert resync(unstated, "eye=screen") == 1
+    assert "has no gaze stream 'eye'; did you mean 'eyes'? there is eyes" in words(capsys)
+    assert resync(unstated, "eyes=window") == 1
+    assert (
+        "--space eyes=window: gaze is in pixels of the participant's window (screen) or of a scene "
+        "camera (scene)"
+    ) in words(capsys)
+    assert unstated.read_bytes() == before
+
+
+def words(capsys: pytest.CaptureFixture[str]) -> str:
+    captured = capsys.readouterr()
+    return " ".join((captured.out + captured.err).split())
+
+
+@pytest.mark.parametrize(
+    ("stated", "is_in"),
+    [
+        ("world", "scene"), ("scene-camera", "scene"), ("World_Camera", "scene"),
+        ("screen", "screen"), ("gaze-on-screen", "screen"), ("Display", "screen"),
+        ("", ""), ("head", ""), ("screen of the world", ""),
+    ],
+)  # fmt: skip
+def test_a_header_states_the_space_at_its_channels_or_once(stated: str, is_in: str) -> None:
+    channels = (Channel("x", "px", extra={"coordinate_system": stated}), Channel("y", "px"))
+    at_channel = StreamHeader("eyes", "Gaze", channels)
+    once = StreamHeader("eyes", "Gaze", (Channel("x", "px"),), desc={"coordinate_system": stated})
+    for header in (at_channel, once):
+        assert gaze_space(cast(Stream, SimpleNamespace(attrs={}, header=header))) == is_in
+        declared = SimpleNamespace(attrs={"space": "screen"}, header=header)
+        assert gaze_space(cast(Stream, declared)) == "screen"
