@@ -5,11 +5,14 @@ import subprocess
 import sys
 import warnings
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from docs.page import blocks
 from needs import needs
 
 from labcrane import RecordingError
@@ -25,6 +28,7 @@ from labcrane_bids.settings import BidsSettings
 from results.recorded import EEG_HZ, LOST
 
 NAME = "sub-P001_ses-01_task-acquisition"
+RECIPES = Path(__file__).parents[2] / "docs" / "recipes.md"
 FOLDER = Path("sub-P001") / "ses-01"
 
 
@@ -146,25 +150,32 @@ def test_the_validator_knows_the_tags_of_every_event_also_of_two_at_once(tmp_pat
     assert [each.split()[0] for each in errors(tmp_path)] == ["HED_ERROR"], "it does look"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @needs("mne", "mne_bids")
 def test_mne_reads_the_participant_file_and_bids_alike_and_epochs_by_label(
     bids: Path, session: SessionRecord
 ) -> None:
-    import mne
     import mne_bids
 
     raw = to_mne(session)
     assert raw.get_channel_types() == ["eeg", "eeg", "eog", "stim"]
     signal = sampled(session.streams["BrainAmp"])
     np.testing.assert_allclose(raw.get_data()[:3].T, 1e-6 * signal.data[:, :3], rtol=1e-12)
-    found, ids = mne.events_from_annotations(raw, verbose="error")
-    epochs = mne.Epochs(
-        raw, found, ids, tmin=-0.1, tmax=0.1, baseline=None, picks="stim", preload=True,
-        event_repeated="drop", verbose="error",
+    recipe: dict[str, Any] = {}
+    (text,) = (each.text for each in blocks(RECIPES) if "mne.Epochs" in each.text)
+    exec(text, recipe)
+    epochs_of = partial(
+        recipe["epochs_of"], tmin=-0.1, tmax=0.1, baseline=None, picks="stim", preload=True,
+        reject_by_annotation=False, verbose="error",
     )  # fmt: skip
-    entered = epochs["target_entered"]
-    inward = epochs["target_entered/direction=inward"]
+    signal = sampled(session.streams["BrainAmp"])
+    inside = np.isfinite(signal.at(session.events["time"].to_numpy() - 0.1))
+    inside &= np.isfinite(signal.at(session.events["time"].to_numpy() + 0.1))
+    there = session.events[inside]["name"].str.replace(".", "_").value_counts().to_dict()
+    assert there["targets_shown"] == there["trial_start"] > 5
+    assert {name: len(epochs_of(raw, name)) for name in there} == there
+    entered = epochs_of(raw, "target_entered")
+    inward = entered["target_entered/direction=inward"]
     assert len(entered) == 12
     assert 0 < len(inward) < len(entered)
     middle = round(0.1 * EEG_HZ)
@@ -179,6 +190,7 @@ def test_mne_reads_the_participant_file_and_bids_alike_and_epochs_by_label(
         again = mne_bids.read_raw_bids(path, verbose="error")
     np.testing.assert_allclose(again.get_data()[:3], raw.get_data()[:3], rtol=1e-6, atol=1e-15)
     assert again.info["line_freq"] == 50.0
+    assert {name: len(epochs_of(again, name)) for name in there} == there
     theirs = again.annotations.onset[again.annotations.description == "target_entered"]
     ours = [each["onset"] for each in raw.annotations
             if each["description"].startswith("target_entered/")]  # fmt: skip

@@ -44,9 +44,10 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
 
     Samples are as they were recorded. Each event is at the sample that was taken when it happened,
     by the corrected clock; those outside of the recording are left out. Annotations are called by
-    labels (docs/markers.md): ``mne.events_from_annotations`` and ``epochs["trial_start"]`` find
-    all that begin so. Where samples are missing is ``BAD_gap``. What people marked afterwards is
-    ``annotation/`` and its text; a mark whose text begins with ``BAD`` stays as it is.
+    labels (docs/markers.md). Several are at one sample, so choose those of one name before epochs
+    are made: ``mne.events_from_annotations(raw, regexp="^trial_start/")``. Where samples are
+    missing is ``BAD_gap``. What people marked afterwards is ``annotation/`` and its text; a mark
+    whose text begins with ``BAD`` stays as it is.
 
     Parameters
     ----------
