@@ -1,7 +1,15 @@
 """The public names of this package, and the modules from which they are imported."""
 
 from .annotations import Annotation, annotate, read_annotations, withdraw
-from .labels import HED_VERSION, LABELS, hed_sidecar, labelled, name_of
+from .labels import (
+    HED_VERSION,
+    LABELS,
+    attempt_of,
+    hed_sidecar,
+    labelled,
+    name_of,
+    void_attempts,
+)
 from .participant_file.about import citation
 from .participant_file.reader import Recording, SessionRecord, Stream, open_recording
 from .participant_file.writer import put_seal
@@ -19,6 +27,7 @@ __all__ = [
     "StreamHeader",
     "XdfWriter",
     "annotate",
+    "attempt_of",
     "citation",
     "hed_sidecar",
     "labelled",
@@ -26,5 +35,6 @@ __all__ = [
     "open_recording",
     "put_seal",
     "read_annotations",
+    "void_attempts",
     "withdraw",
 ]

@@ -3,10 +3,10 @@
 docs/markers.md says how they are made; :data:`KNOWN` says what each means, also in HED.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from labcrane.core.records import Event
+from labcrane.core.records import UNDONE, Event
 
 LABELS = "labcrane.labels"
 """Name of the stream of labels, live and in exports."""
@@ -20,6 +20,10 @@ LONGEST = 64
 BLOCK = ("block", "block_name", "task", "practice")
 TRIAL = ("trial", "attempt", *BLOCK, "counted", "group", "reference")
 """What every trial's event says beside the condition."""
+
+
+Attempt = tuple[object, object]
+"""Number of a trial, and of an attempt at it."""
 
 
 class Meaning(NamedTuple):
@@ -109,9 +113,15 @@ class Labels:
     A label is the event's plain name and, within a block, what the block and the trial are about:
     ``trial_start/block=learning/direction=inward``. Only texts and truth values of a condition are
     levels: numbers, as a target's place, would make every label another one.
+
+    Parameters
+    ----------
+    void
+        Trial and attempt of those that count for nothing, as far as that is known by now.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, void: frozenset[Attempt] = frozenset()) -> None:
+        self._void = void
         self._block: tuple[str, ...] = ()
         self._trial: tuple[str, ...] = ()
 
@@ -124,13 +134,13 @@ class Labels:
         if name == "block.start":
             self._block, self._trial = _block(data), ()
         elif name == "trial.start":
-            self._trial = (*_block(data), *_levels(data))
+            self._trial = self._about(data)
         levels = self._trial or self._block
         if name == "trial.end":
             # The rest of its row is results; of one whose process died, it alone says the trial.
             outcome = plain(str(data.get("outcome", "")))
             asked = {key: value for key, value in data.items() if key != "outcome"}
-            levels = self._trial or (*_block(asked), *_levels(asked))
+            levels = self._trial or self._about(asked)
             levels = (*levels, f"outcome={outcome}") if outcome else levels
             self._trial = ()
         elif name == "block.end":
@@ -139,11 +149,39 @@ class Labels:
             levels = self._block = self._trial = ()
         return "/".join((name_of(name), *levels))
 
+    def _about(self, data: Mapping[str, Any]) -> tuple[str, ...]:
+        uncounted = ("uncounted",) if data.get("counted") is False else ()
+        void = ("void",) if attempt_of(data) in self._void else ()
+        return (*_block(data), *uncounted, *void, *_levels(data))
 
-def labelled(events: Iterable[tuple[str, Mapping[str, Any]]]) -> list[str]:
-    """Return the labels of a whole session's events, by name and data, in order."""
-    labels = Labels()
+
+def labelled(events: Sequence[tuple[str, Mapping[str, Any]]]) -> list[str]:
+    """Return the labels of a whole session's events, by name and data, in order.
+
+    Attempts that turned out to count for nothing are ``void`` from their start on.
+    """
+    labels = Labels(void_attempts(events))
     return [labels.of(name, data) for name, data in events]
+
+
+def attempt_of(data: Mapping[str, Any]) -> Attempt:
+    """Return of which trial an event is, and of which attempt at it."""
+    return data.get("trial"), data.get("attempt")
+
+
+def void_attempts(events: Iterable[tuple[str, Mapping[str, Any]]]) -> frozenset[Attempt]:
+    """Return the attempts that were broken off, or made again later, by a session's events."""
+    last: dict[object, Attempt] = {}
+    void = set()
+    for name, data in events:
+        attempt = attempt_of(data)
+        if name == "trial.start":
+            if (before := last.get(attempt[0], attempt)) != attempt:
+                void.add(before)
+            last[attempt[0]] = attempt
+        elif name == "trial.end" and data.get("outcome") in UNDONE:
+            void.add(attempt)
+    return frozenset(void)
 
 
 def hed_sidecar(names: Iterable[str]) -> dict[str, Any]:

@@ -1,9 +1,18 @@
 """Events: what happened, in seconds from the first sample, with HED tags."""
 
+import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis import events_of, movements_of
-from labcrane.recording import SessionRecord, hed_sidecar, labelled, name_of
+from labcrane.recording import (
+    SessionRecord,
+    attempt_of,
+    hed_sidecar,
+    labelled,
+    name_of,
+    void_attempts,
+)
 from labcrane_bids.files import first_tick
 
 if TYPE_CHECKING:
@@ -13,42 +22,55 @@ REPEAT = "repeat"
 """Tells apart events of one name at one moment: HED joins the tags of a moment, and refuses what is
 said twice."""
 
+END = "trial.end"
+
 MARK = "annotation"
 """What somebody marked afterwards: a row of that type, and a column of its text where there is
 any."""
 
-COLUMNS = ("trial", "attempt", "block", "outcome", "pair", "direction")
-"""What of an event's data becomes a column of its own."""
+COLUMNS = ("trial", "attempt", "block", "practice", "counted", "outcome", "pair", "direction")
+"""What of an event's data becomes a column of its own; of an event in a trial also what the trial's
+start says."""
+
+WHOLE = ("trial", "attempt", "block", "practice", "counted", "void", REPEAT)
+"""Columns of whole numbers; truth is 1."""
 
 
 def event_table(session: SessionRecord) -> "pd.DataFrame":
     """Return the events: onset, duration, trial_type, label, and what trial they are of.
 
     ``trial_type`` is the event's plain name and ``label`` says block and condition too. A trial's
-    start lasts until its end; everything else is a moment. ``response_time`` is the reaction
-    time: from the trial's start to the first stick beyond its dead zone. What somebody marked
-    afterwards is an ``annotation`` with its text.
+    start lasts until its end, which is not known of one whose process died; everything else is a
+    moment. ``response_time`` is the reaction time: from the trial's start to the first stick beyond
+    its dead zone. What somebody marked afterwards is an ``annotation`` with its text.
     """
     import pandas as pd
 
     zero = first_tick(session)
     events = events_of(session).sort_values("time", kind="stable")
-    rows_of = (movement.row for movement in movements_of(session))
-    ended = {(row["trial"], row["attempt"]): row for row in rows_of}
-    rows = []
     told = list(zip(events["name"].astype(str), events["data"], strict=True))
+    void = void_attempts(told)
+    ended = {attempt_of(data): _by_todays_rule(data) for name, data in told if name == END}
+    rows_of = (movement.row for movement in movements_of(session))
+    ended |= {attempt_of(row): row for row in rows_of}
+    rows = []
+    begun: dict[object, dict[str, Any]] = {}
     for time, (name, data), label in zip(events["time"], told, labelled(told), strict=True):
-        key = (data.get("trial"), data.get("attempt"))
-        row = ended.get(key) if name == "trial.start" else None
+        row: Mapping[str, Any] = {}
+        if name == "trial.start":
+            begun[data["trial"]] = {key: data[key] for key in COLUMNS if key in data}
+            row = ended.get(attempt_of(data), {"ended": math.nan})
+        about = {**begun.get(data.get("trial"), {}), **data}
         rows.append(
             {
                 "onset": time - zero,
-                "duration": 0.0 if row is None else row["ended"] - time,
+                "duration": row.get("ended", math.nan) - time if row else 0.0,
                 "trial_type": name_of(name),
                 "label": label,
-                "response_time": None if row is None else row.get("reaction_time"),
+                "response_time": row.get("reaction_time"),
+                "void": attempt_of(about) in void if "attempt" in about else None,
             }
-            | {column: data.get(column) for column in COLUMNS}
+            | {column: about.get(column) for column in COLUMNS}
         )
     marks = session.annotations
     rows += [
@@ -59,9 +81,15 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
     table = pd.DataFrame(rows).sort_values("onset", kind="stable", ignore_index=True)
     again = table.groupby(["onset", "trial_type"]).cumcount() + 1
     table[REPEAT] = again.where(again > 1)
-    for name in ("trial", "attempt", "block", REPEAT):
-        table[name] = table[name].astype("Int64")
+    for name in WHOLE:
+        table[name] = table[name].astype(float).astype("Int64")
     return table
+
+
+def _by_todays_rule(ended: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a trial's end without the reaction time that a former rule has given it."""
+    former = "error_along" in ended and "onset_speed" not in ended
+    return {**ended, "reaction_time": None} if former else ended
 
 
 def event_description(table: "pd.DataFrame", context: dict[str, Any]) -> dict[str, Any]:
@@ -72,7 +100,10 @@ def event_description(table: "pd.DataFrame", context: dict[str, Any]) -> dict[st
     return {
         **(marked if MARK in table else {}),
         "onset": {"Description": "from the first sample of motion", "Units": "s"},
-        "duration": {"Description": "of a trial; 0 for a moment", "Units": "s"},
+        "duration": {
+            "Description": "of a trial, n/a where its end is not known; 0 for a moment",
+            "Units": "s",
+        },
         "trial_type": {**types, "HED": hed},
         "label": {"Description": "name of the event, block and condition"},
         "response_time": {
@@ -82,6 +113,9 @@ def event_description(table: "pd.DataFrame", context: dict[str, Any]) -> dict[st
         "trial": {"Description": "number of the trial in the session"},
         "attempt": {"Description": "counts from 1; more when the trial was repeated"},
         "block": {"Description": "number of the block in the session"},
+        "practice": {"Description": "1 in a trial of practice"},
+        "counted": {"Description": "1 in a trial that is a result; 0 on the way to one"},
+        "void": {"Description": "1 in an attempt that was broken off, or made again later"},
         "outcome": {"Description": "how the trial ended"},
         "pair": {"Description": "pair of targets"},
         "direction": {"Description": "away from the machine's base, or towards it"},

@@ -199,7 +199,7 @@ def _events(participant: Participant, number: int, session: SessionRecord) -> "p
         "{}" if name == "session.start" else json.dumps(data, ensure_ascii=False)
         for name, data in zip(events["name"], events["data"], strict=True)
     ]
-    said = zip(told["name"], told["data"], strict=True)
+    said = list(zip(told["name"], told["data"], strict=True))
     events.insert(list(events).index("name") + 1, "label", labelled(said))
     events.insert(0, "participant", participant.name)
     events.insert(1, "session", number)

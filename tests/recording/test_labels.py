@@ -37,10 +37,28 @@ def test_a_trial_whose_process_died_is_ended_under_its_own_levels() -> None:
         ("trial.end", {**TRIAL, "outcome": "interrupted"}), ("pause.start", {}),
         ("block.start", {**BLOCK, "practice": True}),
     ]  # fmt: skip
+    void = LEVELS.replace("/pair", "/void/pair")
     assert labelled(told)[1:] == [
-        "session_start", f"trial_end/{LEVELS}/outcome=interrupted", "pause_start",
+        "session_start", f"trial_end/{void}/outcome=interrupted", "pause_start",
         "block_start/block=learning/practice",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_an_attempt_is_void_if_it_was_broken_off_or_made_again_and_no_other_is(seed: int) -> None:
+    draws = random.Random(seed)
+    told, void = [], []
+    for trial in range(1, 6):
+        attempts = draws.randint(1, 3)
+        for attempt in range(1, attempts + 1):
+            about = {**BLOCK, "trial": trial, "attempt": attempt, "counted": draws.random() < 0.5}
+            outcome = draws.choice(["success", "timeout", "repeated", "ended", "interrupted"])
+            told += [("trial.start", about), ("target.entered", {"trial": trial})]
+            told += [("trial.end", {**about, "outcome": outcome})]
+            again = attempt < attempts or outcome in {"repeated", "ended", "interrupted"}
+            void += [(about["counted"], again)] * 3
+    found = [label.split("/") for label in labelled(told)]
+    assert [("uncounted" not in parts, "void" in parts) for parts in found] == void
 
 
 @pytest.mark.parametrize("seed", range(20))

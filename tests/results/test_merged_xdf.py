@@ -69,7 +69,9 @@ def test_markers_are_few_names_to_epoch_by_and_labels_with_block_and_condition(
     ]  # fmt: skip
     for label, text in starts:
         condition = f"pair={text['pair']}/far_side={text['far_side']}/direction={text['direction']}"
-        assert label == f"trial_start/block=aiming/{condition}"
+        uncounted = "" if text["counted"] else "uncounted/"
+        assert label == f"trial_start/block=aiming/{uncounted}{condition}"
+    assert {text["counted"] for _, text in starts} == {True, False}
     ends = [label for label in labels if label.startswith("trial_end/")]
     assert [end.replace("end", "start", 1).removesuffix("/outcome=success") for end in ends] == [
         label for label, _ in starts

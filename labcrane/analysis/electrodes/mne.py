@@ -109,7 +109,7 @@ def events_at(session: SessionRecord, signal: Sampled) -> tuple[Any, list[str]]:
     Those outside of the recording are left out.
     """
     events = events_of(session).sort_values("time", kind="stable")
-    told = zip(events["name"].astype(str), events["data"], strict=True)
+    told = list(zip(events["name"].astype(str), events["data"], strict=True))
     positions = signal.at(events["time"].to_numpy(np.float64))
     inside = np.isfinite(positions)
     labels = labelled(told)
