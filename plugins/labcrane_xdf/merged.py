@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -40,8 +41,10 @@ class MergedXdf(Exporter):
     ``labcrane.markers`` with all that is known of each, as JSON. What the names mean, also in HED,
     is in ``labcrane_labels.json``. Marks that people made afterwards are ``labcrane.annotations``.
 
-    Every stream's clock offset is 0, so that nobody corrects twice. A stream whose clock could not
-    be corrected keeps its own time, and says so under ``desc/labcrane``.
+    Every stream's clock offset is 0, so that nobody corrects twice. A regular stream that has
+    holes, or whose steps are not even, states no rate: readers put a line through the stamps of one
+    that does, hole and all. Its rate is under ``desc/labcrane/nominal_srate``. A stream whose clock
+    could not be corrected keeps its own time, and says so there too.
     """
 
     shared = (SIDECAR,)
@@ -101,28 +104,15 @@ def _write_marks(writer: XdfWriter, session: SessionRecord) -> None:
 
 def _write_stream(writer: XdfWriter, name: str, stream: Stream, rate_hz: float) -> None:
     """Write a stream, a stretch of it in memory at a time."""
-    names = list(stream.units)
-    count = len(stream) if names else 0
-    own = "corrected" not in stream.attrs
-    kind = "Frames" if own else str(stream.attrs.get("type", ""))
-    texts = any(each.dtype.kind == "O" for each in stream.columns(names, 0, 1).values())
-    corrected = "yes" if own or stream.attrs["corrected"] else "no"
-    # As they were sent: a participant file holds every number as a double.
-    form = "double64" if own else str(stream.attrs.get("format", "double64"))
-    header = StreamHeader(
-        f"labcrane.{name}" if own else name,
-        kind,
-        tuple(Channel(column, stream.units[column]) for column in names),
-        "string" if texts else form,
-        rate_hz if own else float(stream.attrs.get("rate_hz", 0.0)),
-        source_id=f"labcrane/{name}",
-        desc={"labcrane": {"corrected": corrected}},
-    )
+    count = len(stream) if stream.units else 0
+    sent = stream.header
+    header = _own(name, stream, rate_hz) if sent is None else _sent(name, stream, sent)
+    header = replace(header, rate_hz=_steady(stream, header.rate_hz))
     number = writer.add_stream(header)
     if count:
         writer.write_offset(number, float(stream.column("time", 0, 1)[0]), 0.0)
     for start in range(0, count, CHUNK):
-        part = stream.columns(("time", *names), start, start + CHUNK)
+        part = stream.columns(("time", *stream.units), start, start + CHUNK)
         time = part.pop("time")
         if header.dtype is None:
             rows = [tuple(map(str, row)) for row in zip(*part.values(), strict=True)]
@@ -130,3 +120,37 @@ def _write_stream(writer: XdfWriter, name: str, stream: Stream, rate_hz: float) 
         else:
             rows_of_numbers = np.column_stack(list(part.values()))
             writer.write_samples(number, time, np.ascontiguousarray(rows_of_numbers, header.dtype))
+
+
+def _own(name: str, stream: Stream, rate_hz: float) -> StreamHeader:
+    channels = tuple(Channel(column, unit) for column, unit in stream.units.items())
+    texts = any(
+        each.dtype.kind == "O" for each in stream.columns(list(stream.units), 0, 1).values()
+    )
+    about = {"labcrane": {"corrected": "yes", "nominal_srate": repr(rate_hz)}}
+    form = "string" if texts else "double64"
+    source = f"labcrane/{name}"
+    return StreamHeader(
+        f"labcrane.{name}", "Frames", channels, form, rate_hz, source_id=source, desc=about
+    )
+
+
+def _sent(name: str, stream: Stream, sent: StreamHeader) -> StreamHeader:
+    """Return what a stream of others is, as it was sent; what its stamps needed has been done."""
+    corrected = "yes" if stream.attrs["corrected"] else "no"
+    done = {"labcrane": {"corrected": corrected, "nominal_srate": repr(sent.rate_hz)}}
+    told = {key: value for key, value in sent.desc.items() if key != "synchronization"}
+    by_label = {channel.label: channel for channel in sent.channels}
+    channels = tuple(by_label[column] for column in stream.units)
+    return replace(sent, name=name, channels=channels, desc={**told, **done}, text=None)
+
+
+def _steady(stream: Stream, rate_hz: float) -> float:
+    """Return a stream's rate, and 0 if a line through its stamps is off by more than a sample."""
+    if not rate_hz or len(stream) < 3:  # noqa: PLR2004 - a line goes through two
+        return rate_hz
+    time = stream.column("time")
+    numbers = np.arange(len(time), dtype=np.float64)
+    numbers, from_middle = numbers - numbers.mean(), time - time.mean()
+    line = numbers * (numbers @ from_middle) / (numbers @ numbers)
+    return rate_hz if np.abs(from_middle - line).max() * rate_hz <= 1.0 else 0.0

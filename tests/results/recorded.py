@@ -165,7 +165,7 @@ def _gaze_at(writer: XdfWriter, until: float, where: Callable[[FloatArray], Floa
 
 
 EEG_HZ = 250.0
-LOST = slice(3000, 3050)
+LOST = slice(3000, 3100)
 """Samples of EEG that never came."""
 
 
@@ -175,7 +175,11 @@ def _eeg(writer: XdfWriter, until: float, events: FloatArray) -> None:
     kinds = ("EEG", "EEG", "EOG", "Trigger")
     named = zip(("Fz", "Cz", "HEOG", "pulse"), units, kinds, strict=True)
     channels = tuple(Channel(label, unit, kind) for label, unit, kind in named)
-    header = StreamHeader("BrainAmp", "EEG", channels, "float32", EEG_HZ, source_id="amp")
+    about = {
+        "acquisition": {"manufacturer": "Somebody"},
+        "synchronization": {"can_drop_samples": "false"},
+    }
+    header = StreamHeader("BrainAmp", "EEG", channels, "float32", EEG_HZ, "amp", about)
     time = np.arange(95.0, until, (1.0 + 40e-6) / EEG_HZ)
     data = np.random.default_rng(5).normal(0.0, 20.0, (len(time), 4)).astype(np.float32)
     data[:, 3] = 0.0
