@@ -229,11 +229,17 @@ class Trigger(Component):
     """What tells another device of events by a pulse: a port, a box between LSL and TTL.
 
     Its codes go out in the tick in which the session learns of an event, after the record and
-    before everything else that is told. It is opened in every session but those of ``--fast``.
+    before everything else that is told; of several in one tick the others follow, one at a time. It
+    is opened in every session but those of ``--fast``.
     """
 
     codes: Mapping[str, int] | None = None
-    """Codes by the names of events, 1 to 255; None for the numbers of docs/markers.md."""
+    """Codes by the names of events, 1 to 255, the most urgent first; None for the numbers of
+    docs/markers.md without those of events that are learnt late."""
+
+    spacing_s: float = 0.0
+    """Least time from one code to the next, in seconds: as long as the device takes to show it and
+    to rest. There is always a tick without a code between two."""
 
     fault: str | None = None
     """Why nothing can be sent now, in words; None while all is well.
@@ -244,7 +250,7 @@ class Trigger(Component):
 
     @abstractmethod
     def send(self, codes: Sequence[int], now: float) -> Sequence[Echo]:
-        """Send the codes of a tick, mostly none; return what has come back since the last one.
+        """Send a tick's code, mostly none; return what has come back since the last one.
 
         Called in every tick, and must not wait. A device that is gone is told by ``fault``, not
         raised.
@@ -252,7 +258,7 @@ class Trigger(Component):
         Parameters
         ----------
         codes
-            1 to 255 each, in the order of their events.
+            None or one, 1 to 255.
         now
             In seconds on the session's clock: for what ends a pulse.
         """

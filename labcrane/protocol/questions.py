@@ -23,6 +23,7 @@ from labcrane.protocol.references import twice
 from labcrane.protocol.steps import READING_S, Block
 from labcrane.protocol.streams import SHARES
 from labcrane.protocol.study import Study, trials_of
+from labcrane.streams.markers import LEARNT_LATE
 
 _AT = re.compile(r"(.+?):(\d+)(?::(\d+))?: (.*)")
 
@@ -182,6 +183,7 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_fading(study)
     yield from _of_streams(study)
     yield from _of_gaze(study)
+    yield from _of_pulses(study)
     yield from _of_limits(study)
     yield from _of_repeats(study)
     yield from _of_pattern(study)
@@ -788,6 +790,19 @@ def _of_streams(study: Study) -> Doubts:
                 "network fits, a neighbour's as well, and each run asks which one is meant; give "
                 "the source_id or the name that labcrane streams shows",
             )
+
+
+def _of_pulses(study: Study) -> Doubts:
+    """Question events that are sent as pulses, and are learnt long after they happened."""
+    for part, choice in study.others.items():
+        for each in mentioned(choice.settings) if part.startswith("triggers.") else ():
+            if each.mark == Reference("event") and each.value in LEARNT_LATE:
+                yield (
+                    (*part.split(".", 1), *each.place),
+                    f"{part} sends {each.value} as a pulse, and a session learns of it only "
+                    f"{LEARNT_LATE[str(each.value)]}, which may be seconds later; take it from the "
+                    "labels and the participant file, whose stamps are right, and leave it out",
+                )
 
 
 def _of_gaze(study: Study) -> Doubts:

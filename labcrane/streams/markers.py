@@ -69,3 +69,13 @@ CODES: Mapping[str, int] = {
     "feedback.awaited": 96,
 }
 """A number, once given, never changes its meaning."""
+
+LEARNT_LATE: Mapping[str, str] = {
+    "movement.onset": "when the movement is over, or the trial",
+    "movement.offset": "when the machine has been at rest for as long as a rest takes",
+}
+"""Events that lie behind when a session learns of them, and when it does. Their stamps are right,
+but a pulse is taken for the moment at which it comes."""
+
+PULSES = {event: code for event, code in CODES.items() if event not in LEARNT_LATE}
+"""Codes that go out as pulses where a protocol does not say which."""

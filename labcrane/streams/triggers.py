@@ -1,5 +1,6 @@
 """Triggers: pulses by which other devices are told of a session's events, tick by tick."""
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -9,7 +10,7 @@ from labcrane.core.records import Echo, Event, Frame, Run, Value
 from labcrane.core.roles import Trigger
 from labcrane.errors import PluginError
 from labcrane.limits import LIMITS
-from labcrane.streams.markers import CODES
+from labcrane.streams.markers import PULSES
 
 SENT, UNSENT, ECHO = "trigger.sent", "trigger.unsent", "trigger.echo"
 LOST, BACK = "trigger.lost", "trigger.back"
@@ -18,7 +19,12 @@ HIGHEST = 255
 """Eight lines carry no more."""
 
 LAST_S, BETWEEN_S = 0.25, 0.005
-"""How long echoes of the last codes of a session are waited for, and how long between two looks."""
+"""How long the last codes of a session and their echoes are waited for, and how long between two
+looks."""
+
+STALE_S = 1.0
+"""A code that has waited for so long behind others is not sent any more: it would be taken for the
+moment at which it comes."""
 
 WAITING = 64
 """Codes that are waited for at most; a line without echoes is waited for in vain."""
@@ -36,7 +42,8 @@ class _Line:
     def __init__(self, name: str, trigger: Trigger) -> None:
         self.name = name
         self.trigger = trigger
-        self.codes = CODES if trigger.codes is None else trigger.codes
+        self.codes = PULSES if trigger.codes is None else trigger.codes
+        self.urgency = {event: number for number, event in enumerate(self.codes)}
         wrong = {event: code for event, code in self.codes.items() if not 1 <= code <= HIGHEST}
         if wrong:
             event, code = next(iter(wrong.items()))
@@ -45,14 +52,45 @@ class _Line:
             )
         self.fault: str | None = None
         self.answers = False
+        self.queue: deque[tuple[int, float]] = deque()
+        self.rested, self.free_at = True, -math.inf
         self.waiting: deque[tuple[int, float]] = deque(maxlen=WAITING)
         self.strays = STRAYS
         self.left_out = 0
         self.second: int | None = None
 
+    def take(self, frame: Frame) -> None:
+        """Let the codes of a frame's events wait for their turn, the most urgent before others."""
+        wanted = sorted(
+            (one.name for one in frame.events if one.name in self.codes), key=self._rank
+        )
+        self.queue.extend((self.codes[name], frame.tick.due) for name in wanted)
+
+    @property
+    def owes(self) -> bool:
+        """Whether echoes of what was sent are still to come."""
+        return self.answers and bool(self.waiting)
+
+    def _rank(self, event: str) -> int:
+        return self.urgency[event]
+
+    def next(self, now: float) -> tuple[int, float] | None:
+        """Return the code whose turn it is, and when its tick was due; None where the line rests.
+
+        A device that samples its lines sees two codes only with a rest between.
+        """
+        if not (self.queue and self.rested and now >= self.free_at):
+            self.rested = True
+            return None
+        self.rested, self.free_at = False, now + self.trigger.spacing_s
+        return self.queue.popleft()
+
 
 class Triggers:
     """Sends what happened in a frame to every trigger, and notes when, and what came back.
+
+    Of the codes of one tick the first goes out in it, and the others one at a time in ticks that
+    follow, as soon as the device can show them.
 
     Parameters
     ----------
@@ -76,36 +114,48 @@ class Triggers:
         self._tick = 0
 
     def __call__(self, frame: Frame) -> None:
-        """Send the codes of a frame's events. Does not wait for any device."""
+        """Send what is due of the codes of events. Does not wait for any device."""
         self._tick = frame.tick.number
         for line in self._lines:
-            codes = line.codes
-            wanted = [codes[event.name] for event in frame.events if event.name in codes]
-            began = time.perf_counter()
-            echoes = line.trigger.send(wanted, began)
-            sent, fault = time.perf_counter(), line.trigger.fault
-            if wanted:
-                # One event a tick: what was sent together was sent at one time.
-                data: dict[str, Value] = {"codes": " ".join(map(str, wanted))}
-                if fault is None:
-                    line.waiting.extend((code, began) for code in wanted)
-                    data["delay_s"] = sent - frame.tick.due
-                else:
-                    data["why"] = fault
-                self._write(SENT if fault is None else UNSENT, frame.tick.due, line, data)
-            self._take(line, echoes)
+            line.take(frame)
+            self._send(line, frame.tick.due)
+            self._leave_out(line, frame.tick.due, STALE_S)
             self._tell_of_flood(line, frame.tick.due)
             self._look(line, frame)
+
+    def _send(self, line: _Line, due: float) -> None:
+        """Send the code whose turn it is, if there is any, and take what has come back."""
+        began = time.perf_counter()
+        turn = line.next(began)
+        echoes = line.trigger.send([] if turn is None else [turn[0]], began)
+        sent, fault = time.perf_counter(), line.trigger.fault
+        if turn is not None:
+            code, since = turn
+            if fault is None:
+                line.waiting.append((code, began))
+                self._write(SENT, due, line, {"codes": str(code), "delay_s": sent - since})
+            else:
+                self._write(UNSENT, due, line, {"codes": str(code), "why": fault})
+        self._take(line, echoes)
+
+    def _leave_out(self, line: _Line, now: float, longest_s: float) -> None:
+        """Note codes that have waited for so long that they would say nothing any more."""
+        while line.queue and now - line.queue[0][1] > longest_s:
+            code, _ = line.queue.popleft()
+            why = "more codes than the line can show one after another"
+            self._write(UNSENT, now, line, {"codes": str(code), "why": why})
 
     def finish(self) -> None:
         """Wait a moment for what is still under way, after the last tick."""
         until = time.perf_counter() + LAST_S
-        owing = [line for line in self._lines if line.answers]
-        while any(line.waiting for line in owing) and time.perf_counter() < until:
+        while owing := [each for each in self._lines if each.queue or each.owes]:
+            if time.perf_counter() >= until:
+                break
             time.sleep(BETWEEN_S)
             for line in owing:
-                self._take(line, line.trigger.send((), time.perf_counter()))
+                self._send(line, time.perf_counter())
         for line in self._lines:
+            self._leave_out(line, time.perf_counter(), -math.inf)
             line.second = -1
             self._tell_of_flood(line, time.perf_counter())
 

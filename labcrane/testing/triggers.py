@@ -31,7 +31,7 @@ class TriggerContract:
 
     def test_codes_are_sent_without_waiting(self, trigger: Trigger) -> None:
         with opened(trigger, make_run(ch8())):
-            check_soon(lambda: trigger.send([30, HIGHEST], time.perf_counter()))
+            check_soon(lambda: trigger.send([HIGHEST], time.perf_counter()))
             check_soon(lambda: trigger.send([], time.perf_counter()))
             assert trigger.fault is None, (
                 f"after codes were sent its fault is {trigger.fault!r}; a fault is for a device "

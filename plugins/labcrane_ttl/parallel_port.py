@@ -19,8 +19,6 @@ Control = Callable[[int, int, bytes], object]
 class ParallelTrigger(Trigger):
     """Puts codes on the eight data lines, and clears them when a pulse is over.
 
-    Of several codes in one tick the last one is seen.
-
     Parameters
     ----------
     control
@@ -28,7 +26,7 @@ class ParallelTrigger(Trigger):
     """
 
     def __init__(self, settings: ParallelSettings, control: Control | None = None) -> None:
-        self.codes = settings.codes
+        self.codes, self.spacing_s = settings.codes, settings.spacing_s
         self._path = settings.port
         self._pulse = Pulse(settings.pulse_s)
         self._control = control

@@ -49,7 +49,7 @@ class SerialTrigger(Trigger):
     def __init__(
         self, settings: SerialSettings, written: Callable[[int], bytes], rest: bytes
     ) -> None:
-        self.codes = settings.codes
+        self.codes, self.spacing_s = settings.codes, settings.spacing_s
         self._settings = settings
         self._written = written
         self._rest = rest
@@ -82,7 +82,6 @@ class SerialTrigger(Trigger):
         if self._port is None:
             return ()
         if codes:
-            # All in one write: the codes of one tick lie one behind the other on the wire.
             self._write(b"".join(map(self._written, codes)))
             self._pulse.begin(now)
         elif self._pulse.is_over(now):

@@ -16,12 +16,18 @@ class LineSettings(Settings):
     """What every line has."""
 
     codes: Annotated[dict[EventName, Code], Field(min_length=1)] | None = None
-    """Code of each event that is sent, 1 to 255; all that have a number in docs/markers.md by
-    default, by that number."""
+    """Code of each event that is sent, 1 to 255; of those in one tick the first in this list goes
+    out at once. All that have a number in docs/markers.md by default, by that number, but
+    ``movement.onset`` and ``movement.offset``, which are learnt late."""
 
     pulse_s: NonNegativeFloat = 0.01
-    """How long a code stays on the line, in seconds, at least: it is taken off in a tick. 0 leaves
-    that to the device."""
+    """How long a code stays on the line, in seconds, at least: it is taken off in a tick. For as
+    long it rests before the next one. 0 leaves that to the device."""
+
+    @property
+    def spacing_s(self) -> float:
+        """Least time from one code to the next, in seconds."""
+        return 2.0 * self.pulse_s
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
         first: dict[int, str] = {}

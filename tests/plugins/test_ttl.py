@@ -2,14 +2,16 @@
 
 import errno
 import os
+import random
 import select
 import threading
 import time
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
+import numpy as np
 import pytest
 from needs import needs
 from rehearsal import SHORT, ScriptedConsole, a_study
@@ -19,9 +21,10 @@ import labcrane_ttl
 from labcrane import DeviceError, PluginError, ProtocolError, Trigger
 from labcrane.core import Echo, Event
 from labcrane.core.clock import Tick
+from labcrane.protocol.questions import questions
 from labcrane.registry.registry import discover
 from labcrane.session.session import Visit, run
-from labcrane.streams.markers import CODES
+from labcrane.streams.markers import CODES, LEARNT_LATE, PULSES
 from labcrane.streams.triggers import Triggers
 from labcrane.testing import PluginContract, TriggerContract, ch8, make_frame, make_run, opened
 from labcrane_ttl.parallel_port import CLAIM, WRITE, ParallelTrigger
@@ -252,11 +255,12 @@ def test_what_a_line_with_a_fault_was_to_send_is_not_noted_as_sent() -> None:
         triggers(frame)
 
     tick("trial.start", "unplugged")
-    tick("trial.end", None)
+    tick("trial.end", None)  # its code goes out after a tick of rest
+    tick("session.end", None)
     line.answers = [Echo(5, time.perf_counter()), Echo(6, time.perf_counter())]
     tick("session.end", None)
     assert [event.name for event in notes] == [
-        "trigger.unsent", "trigger.lost", "trigger.sent", "trigger.back", *["trigger.echo"] * 2,
+        "trigger.unsent", "trigger.lost", "trigger.back", "trigger.sent", *["trigger.echo"] * 2,
     ]  # fmt: skip
     assert notes[0].data == {"trigger": "box", "codes": "5", "why": "unplugged"}
     assert notes[4].data["delay_s"] is None, "nobody waits for what was not sent"
@@ -270,15 +274,15 @@ def test_a_device_that_floods_leaves_the_record_small_and_its_true_echoes_in_it(
     frame = make_frame(make_run(ch8()))
     begin, ticks, each = 1000.0, 480, 3000
     for number in range(ticks):
-        due = begin + number / 240.0
-        frame.tick, frame.events = Tick(number, due, due), (Event("trial.start", due),)
-        line.answers = [Echo(5, due), *[Echo(77, due)] * (each - 1)]
+        due, odd = begin + number / 240.0, number % 2
+        frame.tick, frame.events = Tick(number, due, due), (Event("trial.start", due),) * odd
+        line.answers = [*[Echo(5, due)] * odd, *[Echo(77, due)] * (each - odd)]
         triggers(frame)
     triggers.finish()
     echoes = [event for event in notes if event.name == "trigger.echo"]
     floods = [event for event in notes if event.name == "trigger.flood"]
     ours = [event for event in echoes if event.data["code"] == 5]
-    assert len(ours) == ticks
+    assert len(ours) == ticks // 2
     assert len(echoes) - len(ours) == 20 * 2 == 40, "of what nobody sent, 20 a second"
     counted = sum(int(str(event.data["why"]).split()[2]) for event in floods)
     assert counted == ticks * each - len(echoes), "whatever is left out is counted"
@@ -305,7 +309,7 @@ def test_a_flooding_port_is_read_in_pieces_and_keeps_the_newest_echoes(device: D
     assert all(one.time <= other.time for one, other in pairwise(found))
 
 
-def test_every_event_that_has_a_code_is_sent_and_noted_in_its_tick() -> None:
+def test_every_event_that_has_a_code_is_sent_and_noted_the_first_of_a_tick_at_once() -> None:
     made, notes, told = make_run(ch8()), [], []
     all_codes, own = Fixed(), Fixed(trial_start=5)
     triggers = Triggers(
@@ -314,15 +318,24 @@ def test_every_event_that_has_a_code_is_sent_and_noted_in_its_tick() -> None:
     due = time.perf_counter()
     frame = make_frame(made)
     frame.tick = Tick(7, due, due)
-    frame.events = (Event("trial.start", due), Event("somebody.else", due), Event("drop", due))
+    frame.events = (
+        Event("drop", due), Event("somebody.else", due), Event("movement.onset", due - 8.0),
+        Event("trial.start", due),
+    )  # fmt: skip
     triggers(frame)
-    assert all_codes.sent == [[CODES["trial.start"], CODES["drop"]]]
-    assert own.sent == [[5]]
-    (first, tick), (second, _) = notes
+    frame.events = ()
+    for number in (8, 9):
+        frame.tick = Tick(number, due, due)
+        triggers(frame)
+    assert all_codes.sent == [[CODES["trial.start"]], [], [CODES["drop"]]]
+    assert own.sent == [[5], [], []]
+    (first, tick), (second, _), (third, later) = notes
     assert (first.name, tick, first.time) == ("trigger.sent", 7, due)
-    assert (first.data["trigger"], first.data["codes"]) == ("all", "30 48")
+    assert (first.data["trigger"], first.data["codes"]) == ("all", "30")
     assert (second.data["trigger"], second.data["codes"]) == ("own", "5")
-    assert 0.0 <= first.data["delay_s"] <= second.data["delay_s"]
+    assert (third.data["codes"], later) == ("48", 9)
+    assert 0.0 <= first.data["delay_s"] <= second.data["delay_s"] <= third.data["delay_s"]
+    del notes[2]
     came = due + 10.0
     all_codes.answers = [Echo(48, came), Echo(30, came)]  # that of 30 was lost, and comes no more
     all_codes.fault = "unplugged"
@@ -330,8 +343,8 @@ def test_every_event_that_has_a_code_is_sent_and_noted_in_its_tick() -> None:
     triggers(frame)
     echo, stray, lost = (event for event, _ in notes[2:])
     assert echo.data["code"] == 48
-    # From before the code was handed over, which is when the first note says at the latest.
-    assert came - due - first.data["delay_s"] <= echo.data["delay_s"] <= came - due
+    # From before the code was handed over, which is when its note says at the latest.
+    assert came - due - third.data["delay_s"] <= echo.data["delay_s"] <= came - due
     assert stray.data["delay_s"] is None
     assert (lost.name, lost.data["why"]) == ("trigger.lost", "all: unplugged")
     triggers(frame)
@@ -340,6 +353,78 @@ def test_every_event_that_has_a_code_is_sent_and_noted_in_its_tick() -> None:
     assert [event.name for event in told] == ["trigger.lost", "trigger.back"]
     with pytest.raises(PluginError, match=r"trigger 'x' has the code 0 for 'drop'; a code is 1 to"):
         Triggers({"x": Fixed(drop=0)}, lambda event, tick: None, told.append)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_amplifier_at_500_hz_sees_every_code_of_a_tick(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draws, now = random.Random(seed), 100.0
+    clock = SimpleNamespace(perf_counter=lambda: now, sleep=lambda s: None)
+    monkeypatch.setattr("labcrane.streams.triggers.time", clock)
+    levels: list[tuple[float, int]] = [(0.0, 0)]
+
+    def control(file: int, request: int, data: bytes) -> None:
+        if request == WRITE:
+            levels.append((now, data[0]))
+
+    codes = {f"event.{number}": draws.randint(1, 255) for number in range(4)}
+    port = ParallelTrigger(ParallelSettings(port=Path("/dev/null"), codes=codes), control)
+    notes: list[Event] = []
+    triggers = Triggers({"port": port}, lambda event, tick: notes.append(event), notes.append)
+    rate_hz, expected, firsts = draws.uniform(20.0, 1000.0), [], []
+    frame = make_frame(make_run(ch8()))
+    with opened(port, make_run(ch8())):
+        for _ in range(12):
+            names = draws.choices(list(codes), k=draws.randint(1, 4))
+            expected += [codes[name] for name in sorted(names, key=list(codes).index)]
+            firsts.append(now)
+            for tick in range(round(0.5 * rate_hz) + 10):
+                frame.tick = Tick(tick, now, now)
+                frame.events = tuple(Event(name, now) for name in names) if tick == 0 else ()
+                triggers(frame)
+                now += 1.0 / rate_hz
+    samples = np.arange(100.0, now, 1.0 / 500.0)  # what the amplifier sees
+    when, level = np.array(levels).T
+    line = level[np.searchsorted(when, samples, side="right") - 1]
+    begins = np.flatnonzero((line != 0) & (np.diff(line, prepend=0) != 0))
+    seen = line[begins].astype(int).tolist()
+    times = samples[begins]
+    assert seen == expected
+    assert max(np.abs(times - first).min() for first in firsts) <= 1.0 / 500.0
+    assert {event.name for event in notes} == {"trigger.sent"}
+
+
+def test_codes_that_a_line_cannot_show_in_time_are_told_as_not_sent() -> None:
+    notes, line = [], Fixed(trial_start=5)
+    line.spacing_s = 1e9
+    triggers = Triggers({"box": line}, lambda event, tick: notes.append(event), notes.append)
+    frame = make_frame(make_run(ch8()))
+    for number, due in enumerate((0.0, 0.5, 1.4, 1.6)):
+        frame.tick, frame.events = Tick(number, due, due), (Event("trial.start", due),)
+        triggers(frame)
+    assert [event.name for event in notes] == ["trigger.sent", "trigger.unsent"]
+    assert notes[1].time == 1.6
+    assert notes[1].data["why"] == "more codes than the line can show one after another"
+    triggers.finish()
+    assert [event.name for event in notes[2:]] == ["trigger.unsent"] * 2
+
+
+def test_events_that_are_learnt_late_are_asked_about_where_they_are_sent(tmp_path: Path) -> None:
+    codes = "{trial.start: 1, movement.onset: 2, movement.offset: 3}"
+    line = f"{{use: serial_ttl, port: x, codes: {codes}}}"
+    asked = questions(
+        a_study(tmp_path, SHORT + f"triggers: {{amp: {line}, b: {{use: parallel_ttl}}}}\n")
+    )
+    found = {each.key: each.text for each in asked if each.key.startswith("triggers.")}
+    assert list(found) == [
+        "triggers.amp.codes.movement.onset", "triggers.amp.codes.movement.offset",
+    ]  # fmt: skip
+    assert found["triggers.amp.codes.movement.onset"].startswith(
+        "triggers.amp sends movement.onset as a pulse, and a session learns of it only when the "
+        "movement is over, or the trial, which may be seconds later"
+    )
+    assert not set(LEARNT_LATE) & set(PULSES)
 
 
 @pytest.mark.long
@@ -353,8 +438,9 @@ def test_a_session_sends_its_codes_and_the_record_says_when_and_what_came_back(
     events = labcrane.open_recording(run(visit, ScriptedConsole())).session(1).events
     by_name = events.groupby("name")["data"].apply(list)
     sent = [int(code) for data in by_name["trigger.sent"] for code in data["codes"].split()]
-    known = events[events["name"].isin(list(CODES)) & (events["name"] != "session.start")]
-    assert sent == [CODES[name] for name in known.sort_values("time", kind="stable")["name"]]
+    known = events[events["name"].isin(list(PULSES)) & (events["name"] != "session.start")]
+    known = known.assign(code=known["name"].map(PULSES), rank=known["name"].map(list(PULSES).index))
+    assert sent == known.sort_values(["tick", "rank"], kind="stable")["code"].tolist()
     assert bytes(byte for byte in answering.heard if byte) == bytes(sent)
     delays = [data["delay_s"] for data in by_name["trigger.echo"]]
     assert [data["code"] for data in by_name["trigger.echo"]] == sent
