@@ -5,7 +5,7 @@ from .cohort import Participant, find_cohort
 from .electrodes.mne import EEG_READERS, channel_types, eeg_streams, events_at, to_mne, volts
 from .electrodes.sampled import Sampled, sampled
 from .exporter import Exporter
-from .gaze import fixations_of, with_unseen_areas
+from .gaze import Glass, fixations_of, glass_of, with_unseen_areas
 from .gaze_streams import gaze_space
 from .measures import measures_of
 from .movements import Movement, events_of, movements_of
@@ -17,6 +17,7 @@ __all__ = [
     "EEG_READERS",
     "Dataset",
     "Exporter",
+    "Glass",
     "Movement",
     "Participant",
     "Sampled",
@@ -32,6 +33,7 @@ __all__ = [
     "find_cohort",
     "fixations_of",
     "gaze_space",
+    "glass_of",
     "measures_of",
     "movements_of",
     "open_dataset",

@@ -321,12 +321,15 @@ class Glass:
         How the window shows it turned over: ``none``, ``horizontal`` or ``vertical``.
     px_per_m, viewing_m
         Pixels in a metre of it, and the eye's distance in metres; NaN where nobody said.
+    refresh_hz
+        How often the monitor shows a picture, in Hz; NaN where nobody knew.
     """
 
     size: tuple[int, int]
     flip: str = "none"
     px_per_m: float = math.nan
     viewing_m: float = math.nan
+    refresh_hz: float = math.nan
 
     def pixel(self, x: float, y: float) -> tuple[float, float]:
         """Return where a share of width and height is, in pixels from the upper left corner."""
@@ -411,9 +414,18 @@ def fixations_of(participant: Participant) -> "pd.DataFrame":
     return found[["participant", "session", *FIXATIONS]]
 
 
+def glass_of(session: SessionRecord) -> Glass | None:
+    """Return the operator's picture; None where there was none, or several that differ."""
+    events = session.events
+    ready = events.loc[events["name"] == "feedback.ready", "data"]
+    found = [glass for data in ready if (glass := _glass(str(data["facts"]))) is not None]
+    return found[0] if found and all(str(each) == str(found[0]) for each in found) else None
+
+
 def _glass(facts: str) -> Glass | None:
     """Return the picture that facts of a view are about; None where it is not the operator's."""
-    told = dict(re.findall(r"(?:^|, )(seen_by|size|flip|px_per_m|viewing_m) (\w[\w.+-]*)", facts))
+    names = "seen_by|size|flip|px_per_m|viewing_m|refresh_hz(?! not known)"
+    told = dict(re.findall(rf"(?:^|, )({names}) (\w[\w.+-]*)", facts))
     size = re.fullmatch(r"(\d+)x(\d+)", told.get("size", ""))
     if told.get("seen_by") != "operator" or size is None:
         return None
@@ -422,6 +434,7 @@ def _glass(facts: str) -> Glass | None:
         told.get("flip", "none"),
         float(told.get("px_per_m", math.nan)),
         float(told.get("viewing_m", math.nan)),
+        float(told.get("refresh_hz", math.nan)),
     )
 
 

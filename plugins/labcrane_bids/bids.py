@@ -15,7 +15,7 @@ from labcrane_bids.dataset import (
     people_table,
 )
 from labcrane_bids.eeg import eeg_description, write_eeg
-from labcrane_bids.events import event_description, event_table
+from labcrane_bids.events import event_description, event_table, screen_of
 from labcrane_bids.files import first_tick, label, write_bare_tsv, write_json, write_tsv
 from labcrane_bids.motion import TrackingSystem, tracking_systems
 from labcrane_bids.phenotype import Phenotype, demographics_of
@@ -95,7 +95,7 @@ class Bids(Exporter):
             scans.append((f"motion/{path.name}.tsv", 0.0))
         events = event_table(session)
         write_tsv(at / "motion" / f"{named}_events.tsv", events)
-        about = event_description(events, context)
+        about = event_description(events, context, screen_of(session))
         write_json(at / "motion" / f"{named}_events.json", about)
         streams = eeg_streams(session)
         for stream in streams:
@@ -109,6 +109,9 @@ class Bids(Exporter):
             path = at / "beh" / f"{named}_recording-{recording}_physio"
             write_bare_tsv(path.with_name(f"{path.name}.tsv.gz"), samples)
             write_json(path.with_name(f"{path.name}.json"), description)
+            if description["PhysioType"] == "eyetrack":  # which needs events and screen beside it
+                write_tsv(at / "beh" / f"{named}_events.tsv", events)
+                write_json(at / "beh" / f"{named}_events.json", about)
             scans.append((f"beh/{path.name}.tsv.gz", 0.0))
         self._without |= set(left_out(session))
         when = [

@@ -4,7 +4,9 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from labcrane.analysis import events_of, movements_of
+import numpy as np
+
+from labcrane.analysis import events_of, glass_of, movements_of
 from labcrane.recording import (
     SessionRecord,
     attempt_of,
@@ -92,8 +94,33 @@ def _by_todays_rule(ended: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**ended, "reaction_time": None} if former else ended
 
 
-def event_description(table: "pd.DataFrame", context: dict[str, Any]) -> dict[str, Any]:
-    """Return the sidecar: every column, and the levels of trial_type with their HED tags."""
+def screen_of(session: SessionRecord) -> dict[str, Any]:
+    """Return what is known of the operator's picture, as BIDS has it; n/a would be no screen.
+
+    Its window stands for the screen: places of gaze are in its pixels, from its upper left corner.
+    """
+    glass = glass_of(session)
+    if glass is None:
+        return {"ScreenOrigin": ["top", "left"]}
+    told: dict[str, Any] = {
+        "ScreenDistance": glass.viewing_m,
+        "ScreenRefreshRate": glass.refresh_hz,
+        "ScreenSize": [side / glass.px_per_m for side in glass.size],
+    }
+    return {
+        "ScreenOrigin": ["top", "left"],
+        "ScreenResolution": list(glass.size),
+        **{name: value for name, value in told.items() if np.isfinite(value).all()},
+    }
+
+
+def event_description(
+    table: "pd.DataFrame", context: dict[str, Any], screen: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the sidecar: every column, and the levels of trial_type with their HED tags.
+
+    ``screen`` is what is known of the screen (:func:`screen_of`).
+    """
     types = hed_sidecar(table["trial_type"])
     hed = {name: f"{tags.removesuffix(')')}, {{{REPEAT}}})" for name, tags in types["HED"].items()}
     marked = {MARK: {"Description": "what somebody wrote into the recording afterwards"}}
@@ -128,5 +155,6 @@ def event_description(table: "pd.DataFrame", context: dict[str, Any]) -> dict[st
             "SoftwareName": "labcrane",
             "SoftwareVersion": str(context.get("versions", {}).get("labcrane", "n/a")),
             "Code": "n/a",
+            **screen,
         },
     }

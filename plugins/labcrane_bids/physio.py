@@ -1,6 +1,6 @@
 """Physio: gaze and other streams of numbers at a rate, each as a recording of its own."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,13 +12,9 @@ from labcrane_bids.files import MISSING, ROWS, first_tick, label
 from labcrane_bids.settings import BidsSettings
 
 GAZE = "Gaze"
-KNOWN = {
-    "x": "x_coordinate",
-    "y": "y_coordinate",
-    "pupil": "pupil_size",
-    "pupil_size": "pupil_size",
-}
-"""Channels of gaze that BIDS has names for; others keep their labels."""
+ON_SCREEN = "gaze-on-screen"
+PUPIL = {"pupil": "pupil_size", "pupil_size": "pupil_size"}
+"""Channels of gaze beside its place that BIDS has names for; others keep their labels."""
 
 SYSTEMS = {
     "m": "gaze-in-world", "cm": "gaze-in-world", "mm": "gaze-in-world", "meters": "gaze-in-world",
@@ -26,7 +22,7 @@ SYSTEMS = {
 }  # fmt: skip
 """Coordinate system of gaze, by the unit of its x: what is in metres is in the world."""
 
-SPACES = {"screen": "gaze-on-screen", "scene": "eye-in-head"}
+SPACES = {"screen": ON_SCREEN, "scene": "eye-in-head"}
 """Coordinate system of pixels and shares of a picture, by whose picture it is: a scene camera moves
 with the head."""
 
@@ -75,8 +71,10 @@ def _rate(stream: Stream) -> float:
 def _recording(
     stream: Stream, zero: float, settings: BidsSettings, *, gaze: bool
 ) -> tuple[Iterator[list[FloatArray]], dict[str, Any]]:
-    labels = stream.numeric
-    called = [KNOWN.get(name, name) for name in labels] if gaze else labels
+    place = _place(stream.numeric) if gaze else ()
+    labels = [*place, *(name for name in stream.numeric if name not in place)]
+    names = dict(zip(place, ("x_coordinate", "y_coordinate"), strict=False)) | PUPIL if gaze else {}
+    called = [names.get(name, name) for name in labels]
     rate_hz = _rate(stream)
     if rate_hz == 0.0 and len(stream) > 1:
         rate_hz = float(1.0 / np.median(np.diff(stream.column("time"))))
@@ -85,18 +83,30 @@ def _recording(
         "SamplingFrequency": rate_hz,
         "StartTime": float(stream.column("time", 0, 1)[0] - zero) if len(stream) else 0.0,
         "Columns": columns,
-        "PhysioType": "eyetrack" if gaze else "generic",
+        "PhysioType": "eyetrack" if place else "generic",  # BIDS has no eyes without a place
         "Manufacturer": str(stream.attrs.get("source_id", MISSING)) or MISSING,
     }
-    if gaze:
-        unit = stream.units.get("x", "").lower()
+    if place:
+        unit = stream.units[place[0]]
+        by_unit = SYSTEMS.get(unit.lower()) or SPACES.get(gaze_space(stream))
         about["RecordedEye"] = "cyclopean"
-        by_unit = SYSTEMS.get(unit) or SPACES.get(gaze_space(stream))
-        about["SampleCoordinateSystem"] = settings.gaze_system or by_unit or MISSING
+        about["SampleCoordinateSystem"] = settings.gaze_system or by_unit or "custom"
+        if about["SampleCoordinateSystem"] == "custom":
+            said = f"in {unit or 'no stated unit'}; of which picture, nobody has said"
+            about["SampleCoordinateSystemDescription"] = said
     units = ["s", *(stream.units[name] or "arbitrary" for name in labels)]
     for column, unit in zip(columns, units, strict=True):
         about[column] = {"Description": column.replace("_", " "), "Units": unit}
     return _samples(stream, zero, labels), about
+
+
+def _place(labels: Sequence[str]) -> tuple[str, ...]:
+    """Return the first x that has its y: ``x`` and ``y``, ``Gaze X`` and ``Gaze Y``."""
+    for name in labels:
+        other = name[:-1] + {"x": "y", "X": "Y"}.get(name[-1:], "")
+        if other in labels and other != name[:-1]:
+            return name, other
+    return ()
 
 
 def _samples(stream: Stream, zero: float, labels: list[str]) -> Iterator[list[FloatArray]]:

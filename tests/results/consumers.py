@@ -1,7 +1,9 @@
 """Programs of others that must read what labcrane writes."""
 
+import json
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 from needs import needs
@@ -19,6 +21,16 @@ def r(script: str, *arguments: object) -> str:
 def octave(script: str, argument: object) -> str:
     """Run a script in Octave, with ``argument`` set to a path; return what it prints."""
     return _run(["octave-cli", "-q", "--eval", f"argument = '{argument}';\n{script}"])
+
+
+def bids_errors(folder: Path) -> list[str]:
+    """Return what the BIDS validator calls an error in a data set: code and file."""
+    program = Path(sys.executable).with_name("bids-validator-deno")
+    done = subprocess.run(
+        [program, "--json", folder], capture_output=True, encoding="utf-8", check=False
+    )
+    issues = json.loads(done.stdout)["issues"]["issues"]
+    return [f"{i['code']} {i.get('location')}" for i in issues if i["severity"] == "error"]
 
 
 def _run(command: list[str]) -> str:

@@ -136,7 +136,7 @@ def _gaze_in_window(
     on = time % 1.0 < 0.5
     x = np.where(on, 100.0 + 1000.0 * (len(cameras) - 1), 700.0)
     spots = np.column_stack([x, np.full(len(time), 50.0)])
-    for name, said in zip(("eyes", "glasses"), stated, strict=False):
+    for name, said in zip(("eyes", "glasses", "relay"), stated, strict=False):
         header = StreamHeader(name, "Gaze", in_pixels(said), "double64", 50.0, source_id=name)
         _stream(writer, header, time, OFFSET_S, spots)
     boxes = []

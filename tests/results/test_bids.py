@@ -4,8 +4,6 @@ import gzip
 import io
 import json
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,10 +18,9 @@ from labcrane.design.plan import plan_session
 from labcrane.testing import ch8
 from labcrane_bids.bids import Bids
 from labcrane_bids.settings import BidsSettings
-from results.consumers import under
+from results.consumers import bids_errors, under
 from results.recorded import STUDY, record, study
 
-VALIDATOR = shutil.which("bids-validator-deno", path=Path(sys.executable).parent)
 NAME = "sub-P001_ses-01_task-acquisition"
 MOTION = f"sub-P001/ses-01/motion/{NAME}"
 
@@ -52,21 +49,13 @@ def folder(cohort: Cohort, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def errors(folder: Path) -> list[str]:
-    done = subprocess.run(
-        [str(VALIDATOR), "--json", str(folder)], capture_output=True, encoding="utf-8", check=False
-    )
-    issues = json.loads(done.stdout)["issues"]["issues"]
-    return [f"{i['code']} {i.get('location')}" for i in issues if i["severity"] == "error"]
-
-
 validated = needs("bids-validator-deno")
 
 
 @pytest.mark.slow
 @validated
 def test_the_validator_reports_no_error(folder: Path) -> None:
-    assert errors(folder) == []
+    assert bids_errors(folder) == []
 
 
 @pytest.mark.slow
@@ -81,7 +70,7 @@ def test_the_validator_does_find_errors(folder: Path, tmp_path: Path) -> None:
         about.read_text(encoding="utf-8").replace("Experiment-structure", "No-such-tag"),
         encoding="utf-8",
     )
-    found = " ".join(errors(broken))
+    found = " ".join(bids_errors(broken))
     assert "SIDECAR" in found or "MISSING" in found
     assert "HED_ERROR" in found
 

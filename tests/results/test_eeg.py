@@ -1,8 +1,6 @@
 """EEG on the session's clock: for MNE, and in BIDS."""
 
 import json
-import subprocess
-import sys
 import warnings
 from dataclasses import replace
 from functools import partial
@@ -25,6 +23,7 @@ from labcrane.testing import ch8
 from labcrane_bids.bids import Bids
 from labcrane_bids.events import event_description
 from labcrane_bids.settings import BidsSettings
+from results.consumers import bids_errors
 from results.recorded import EEG_HZ, LOST
 
 NAME = "sub-P001_ses-01_task-acquisition"
@@ -113,19 +112,10 @@ def test_a_heart_is_physio_and_gaze_in_metres_is_in_the_world(bids: Path) -> Non
     assert eyes["SampleCoordinateSystem"] == "gaze-in-world"
 
 
-def errors(folder: Path) -> list[str]:
-    program = Path(sys.executable).with_name("bids-validator-deno")
-    done = subprocess.run(
-        [program, "--json", folder], capture_output=True, encoding="utf-8", check=False
-    )
-    issues = json.loads(done.stdout)["issues"]["issues"]
-    return [f"{i['code']} {i.get('location')}" for i in issues if i["severity"] == "error"]
-
-
 @pytest.mark.slow
 @needs("bids-validator-deno")
 def test_the_validator_finds_no_error_in_eeg_motion_physio_and_phenotype(bids: Path) -> None:
-    assert errors(bids) == []
+    assert bids_errors(bids) == []
 
 
 @pytest.mark.slow
@@ -141,13 +131,15 @@ def test_the_validator_knows_the_tags_of_every_event_also_of_two_at_once(tmp_pat
         {"onset": 1.0, "duration": 0.0, "trial_type": names, "label": names,
          "repeat": ["n/a"] * len(KNOWN) + ["2", "n/a"]}
     )  # fmt: skip
-    columns = {key: value for key, value in event_description(table, {}).items() if key in table}
+    columns = {
+        key: value for key, value in event_description(table, {}, {}).items() if key in table
+    }
     path = folder / "sub-1_task-a_events.json"
     path.write_text(json.dumps({**columns, "TaskName": "a"}), encoding="utf-8")
     table.to_csv(path.with_suffix(".tsv"), sep="\t", index=False)
-    assert errors(tmp_path) == []
+    assert bids_errors(tmp_path) == []
     table.assign(repeat="n/a").to_csv(path.with_suffix(".tsv"), sep="\t", index=False)
-    assert [each.split()[0] for each in errors(tmp_path)] == ["HED_ERROR"], "it does look"
+    assert [each.split()[0] for each in bids_errors(tmp_path)] == ["HED_ERROR"], "it does look"
 
 
 @pytest.mark.slow
