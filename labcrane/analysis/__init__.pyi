@@ -2,7 +2,15 @@
 
 from .codebook import codebook_of
 from .cohort import Participant, find_cohort
-from .electrodes.mne import EEG_READERS, channel_types, eeg_streams, events_at, to_mne, volts
+from .electrodes.mne import (
+    EEG_READERS,
+    channel_types,
+    eeg_streams,
+    events_at,
+    faults_of,
+    to_mne,
+    volts,
+)
 from .electrodes.sampled import Sampled, sampled
 from .exporter import Exporter
 from .gaze import Glass, fixations_of, glass_of, with_unseen_areas
@@ -30,6 +38,7 @@ __all__ = [
     "eeg_streams",
     "events_at",
     "events_of",
+    "faults_of",
     "find_cohort",
     "fixations_of",
     "gaze_space",

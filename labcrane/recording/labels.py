@@ -147,6 +147,9 @@ class Labels:
             self._block = self._trial = ()
         elif name in {"session.start", "session.resumed"}:
             levels = self._block = self._trial = ()
+        if name in {"signal.bad", "signal.good"}:
+            where = {key: str(data[key]) for key in ("stream", "channel", "kind") if data.get(key)}
+            levels = (*levels, *(f"{key}={plain(what)}" for key, what in where.items()))
         return "/".join((name_of(name), *levels))
 
     def _about(self, data: Mapping[str, Any]) -> tuple[str, ...]:

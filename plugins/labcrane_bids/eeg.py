@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane.analysis import Sampled, channel_types, sampled, volts
+from labcrane.analysis import Sampled, channel_types, faults_of, sampled, volts
 from labcrane.recording import SessionRecord, Stream
 from labcrane_bids.brainvision import write_brainvision
 from labcrane_bids.files import MISSING, first_tick, write_json, write_tsv
@@ -63,7 +63,9 @@ def write_eeg(
     )
     stem = path.name.removesuffix("_eeg")
     write_tsv(path.with_name(f"{stem}_events.tsv"), table)
-    write_tsv(path.with_name(f"{stem}_channels.tsv"), _channels(signal, kinds, units))
+    write_tsv(
+        path.with_name(f"{stem}_channels.tsv"), _channels(signal, kinds, units, session, stream)
+    )
     write_json(path.with_name(f"{path.name}.json"), _about(signal, stream, kinds, task, settings))
     return signal
 
@@ -100,15 +102,28 @@ def _events(events: "pd.DataFrame", signal: Sampled, session: SessionRecord) -> 
     return table
 
 
-def _channels(signal: Sampled, kinds: list[str], units: list[str]) -> "pd.DataFrame":
+def _channels(
+    signal: Sampled, kinds: list[str], units: list[str], session: SessionRecord, stream: Stream
+) -> "pd.DataFrame":
+    """Return what channels are; monitors' faults describe one, and call none bad."""
     import pandas as pd
 
+    faults = faults_of(session, stream)
+    ended = faults["end"].clip(upper=signal.time[-1])
+    said = [
+        f"{kind} for {end - start:.1f} s"
+        for kind, start, end in zip(faults["kind"], faults["start"], ended, strict=True)
+    ]
+    of = list(zip(faults["channel"], said, strict=True))
+    told = ["; ".join(words for name, words in of if name in ("", each)) for each in signal.labels]
     return pd.DataFrame(
         {
             "name": signal.labels,
             "type": kinds,
             "units": units,
             "sampling_frequency": signal.rate_hz,
+            "status": MISSING,
+            "status_description": [words or MISSING for words in told],
         }
     )
 

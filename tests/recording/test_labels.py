@@ -44,6 +44,16 @@ def test_a_trial_whose_process_died_is_ended_under_its_own_levels() -> None:
     ]  # fmt: skip
 
 
+def test_a_fault_of_a_signal_says_where_and_what_it_is() -> None:
+    about = {"stream": "Brain Amp", "channel": "Fz", "kind": "flat line", "message": "why"}
+    assert labelled([("block.start", BLOCK), ("signal.bad", about)])[1] == (
+        "signal_bad/block=learning/stream=Brain_Amp/channel=Fz/kind=flat_line"
+    )
+    assert labelled([("signal.good", {**about, "channel": ""})]) == [
+        "signal_good/stream=Brain_Amp/kind=flat_line"
+    ]
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_an_attempt_is_void_if_it_was_broken_off_or_made_again_and_no_other_is(seed: int) -> None:
     draws = random.Random(seed)

@@ -169,6 +169,13 @@ LOST = slice(3000, 3100)
 """Samples of EEG that never came."""
 
 
+_FZ = {"event": "signal", "channel": "Fz", "kind": "flat line", "message": "does not move"}
+FLAT = {110.0: {**_FZ, "bad": True}, 125.0: {**_FZ, "bad": False}}
+"""What a monitor told of Fz, by the time of it."""
+
+NOTHING: Mapping[float, Mapping[str, object]] = {}
+
+
 def _eeg(writer: XdfWriter, until: float, events: FloatArray) -> None:
     """Write EEG with a pulse at the sample nearest to each event; its clock is 40 ppm slow."""
     units = ("microvolts", "microvolts", "microvolts", "")
@@ -187,7 +194,7 @@ def _eeg(writer: XdfWriter, until: float, events: FloatArray) -> None:
     data[at, 3] = 1.0
     keep = np.ones(len(time), bool)
     keep[LOST] = False
-    _stream(writer, header, time[keep], 777.0, data[keep], drift=-40e-6)
+    _stream(writer, header, time[keep], 777.0, data[keep], drift=-40e-6, told=FLAT)
 
 
 def _pulse(writer: XdfWriter, until: float) -> None:
@@ -205,6 +212,7 @@ def _stream(
     offset: float,
     data: npt.NDArray[np.generic],
     drift: float = 0.0,
+    told: Mapping[float, Mapping[str, object]] = NOTHING,
 ) -> None:
     """Write samples taken at ``time`` on our clock, stamped with the source's; and its probes."""
 
@@ -220,4 +228,5 @@ def _stream(
     arrivals = writer.add_stream(beside["arrivals"])
     writer.write_samples(arrivals, time[-1:], np.array([[float(len(time)), float(time[-1])]]))
     notes = writer.add_stream(beside["notes"])
-    writer.write_texts(notes, [90.0], [(json.dumps({"event": "begin"}),)])
+    texts = {90.0: {"event": "begin"}, **told}
+    writer.write_texts(notes, list(texts), [(json.dumps(each),) for each in texts.values()])

@@ -153,6 +153,10 @@ def test_mne_reads_the_participant_file_and_bids_alike_and_epochs_by_label(
     assert raw.get_channel_types() == ["eeg", "eeg", "eog", "stim"]
     signal = sampled(session.streams["BrainAmp"])
     np.testing.assert_allclose(raw.get_data()[:3].T, 1e-6 * signal.data[:, :3], rtol=1e-12)
+    (fault,) = (each for each in raw.annotations if each["description"] == "fault/flat_line")
+    assert fault["ch_names"] == ("Fz",)
+    zero = signal.time[0]
+    assert [zero + fault["onset"], fault["duration"]] == pytest.approx([110.0, 15.0], abs=0.5)
     recipe: dict[str, Any] = {}
     (text,) = (each.text for each in blocks(RECIPES) if "mne.Epochs" in each.text)
     exec(text, recipe)
@@ -182,6 +186,10 @@ def test_mne_reads_the_participant_file_and_bids_alike_and_epochs_by_label(
         again = mne_bids.read_raw_bids(path, verbose="error")
     np.testing.assert_allclose(again.get_data()[:3], raw.get_data()[:3], rtol=1e-6, atol=1e-15)
     assert again.info["line_freq"] == 50.0
+    assert again.info["bads"] == [], "which channels are bad is for the analyst to say"
+    channels = pd.read_csv(path.copy().update(suffix="channels", extension=".tsv").fpath, sep="\t")
+    described = channels.set_index("name")["status_description"].dropna().to_dict()
+    assert described == {"Fz": "flat line for 15.0 s"}
     assert {name: len(epochs_of(again, name)) for name in there} == there
     theirs = again.annotations.onset[again.annotations.description == "target_entered"]
     ours = [each["onset"] for each in raw.annotations

@@ -9,11 +9,12 @@ from labcrane.analysis.electrodes.sampled import Sampled, sampled
 from labcrane.analysis.movements import events_of
 from labcrane.errors import PluginError, RecordingError, nearest
 from labcrane.files.units import in_unit
-from labcrane.recording.labels import labelled
+from labcrane.recording.labels import labelled, plain
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
 
 if TYPE_CHECKING:
     import mne
+    import pandas as pd
 
 EEG = "EEG"
 
@@ -29,8 +30,15 @@ KINDS = {
 ELECTRIC = ("eeg", "eog", "ecg", "emg")
 """Types that MNE has in volts."""
 
+FAULT_COLUMNS = (("channel", object), ("kind", object), ("start", float), ("end", float))
+
 GAP = "BAD_gap"
 """Annotation at which samples are missing: MNE leaves out epochs that go over one."""
+
+
+FAULT = "fault"
+"""How annotations of a channel's faults begin; they are no ``BAD``, which MNE takes for all
+channels at once."""
 
 
 def eeg_streams(session: SessionRecord) -> list[Stream]:
@@ -47,7 +55,9 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
     labels (docs/markers.md). Several are at one sample, so choose those of one name before epochs
     are made: ``mne.events_from_annotations(raw, regexp="^trial_start/")``. Where samples are
     missing is ``BAD_gap``. What people marked afterwards is ``annotation/`` and its text; a mark
-    whose text begins with ``BAD`` stays as it is.
+    whose text begins with ``BAD`` stays as it is. What monitors told of a channel is ``fault/`` and
+    its kind, of that channel alone (``ch_names``): which channels are bad is for the analyst to
+    say.
 
     Parameters
     ----------
@@ -84,18 +94,50 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
     marks = session.annotations
     marks = marks.assign(at=signal.at(marks["time"].to_numpy(float))).dropna(subset="at")
     lengths = (marks["until"] - marks["time"]).to_numpy(float)
+    faults = faults_of(session, chosen)
+    began, ended = (
+        signal.at(faults[edge].clip(signal.time[0], signal.time[-1]).to_numpy(float))
+        for edge in ("start", "end")
+    )
     raw.set_annotations(
         mne.Annotations(
-            np.concatenate([onsets, gaps, marks["at"].to_numpy(float)]) / signal.rate_hz,
+            np.concatenate([onsets, gaps, marks["at"].to_numpy(float), began]) / signal.rate_hz,
             np.concatenate(
-                [np.zeros(len(onsets)), np.full(len(gaps), 1.0 / signal.rate_hz), lengths]
+                [
+                    np.zeros(len(onsets)),
+                    np.full(len(gaps), 1.0 / signal.rate_hz),
+                    lengths,
+                    (ended - began) / signal.rate_hz,
+                ]
             ),
-            [*labels, *[GAP] * len(gaps), *map(_marked, marks["text"])],
+            [
+                *labels,
+                *[GAP] * len(gaps),
+                *map(_marked, marks["text"]),
+                *(f"{FAULT}/{plain(kind)}" for kind in faults["kind"]),
+            ],
             orig_time=raw.info["meas_date"],
+            ch_names=[
+                *[()] * (len(onsets) + len(gaps) + len(marks)),
+                *((name,) if name in signal.labels else () for name in faults["channel"]),
+            ],
         ),
         verbose="error",
     )
     return raw
+
+
+def faults_of(session: SessionRecord, stream: Stream) -> "pd.DataFrame":
+    """Return the faults that monitors told of a stream: channel, kind, start and end in s, ...
+
+    A channel is empty for the whole stream; an end is infinite where the fault lasted.
+    """
+    import pandas as pd
+
+    faults = session.signal_faults
+    if faults.empty:
+        return pd.DataFrame({name: pd.Series([], dtype=kind) for name, kind in FAULT_COLUMNS})
+    return faults[faults["stream"] == str(stream.attrs["name"])]
 
 
 def _marked(text: str) -> str:
