@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.gaze import FIXATIONS, gaze_units
+from labcrane.analysis.presented import PRESENTED
 from labcrane.analysis.questionnaires import ANSWERS, MEANING, SCORES, asked_in, score_column
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.recording.participant_file.reader import SessionRecord
@@ -65,16 +66,13 @@ def trial_codebook(
 
     units = session.context.get("trial_units", {})
     definitions = session.context.get("trial_definitions", {})
-    gaze = gaze_units(measures.columns)
+    computed = {**MEASURES, **PRESENTED, **gaze_units(measures.columns)}
     rows = []
     for column in map(str, measures.columns):
         if column in IDENTITY:
             row = ("", IDENTITY[column], WRITTEN)
-        elif column in MEASURES:
-            unit, meaning = MEASURES[column]
-            row = (unit, meaning, MEASURED)
-        elif column in gaze:
-            row = (*gaze[column], MEASURED)
+        elif column in computed:
+            row = (*computed[column], MEASURED)
         elif column in asked:
             row = ("", asked[column], WRITTEN)
         else:

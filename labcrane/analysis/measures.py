@@ -19,6 +19,7 @@ from labcrane.analysis.movements import (
     machine_of,
     movements_of,
 )
+from labcrane.analysis.presented import presented
 from labcrane.analysis.quality import OF_AIMING, without_onset
 from labcrane.analysis.sticks import coordination, effort, limit_hits, reversals, stick_use
 from labcrane.analysis.tables.definitions import MEASURES
@@ -178,7 +179,8 @@ def measure_session(
         told = {name: [row.get(name, np.nan) for row in recorded] for name in ANEW}
         there = {name: told[name] for name in ANEW if any(name in row for row in recorded)}
         trials = trials.assign(**there)
-    return pd.concat([trials, _order(trials), measured], axis=1)
+    shown = presented(session)
+    return pd.concat([trials, _order(trials), measured, shown], axis=1)
 
 
 OF_TRIALS = ("sequence", "position", "constant_error", "absolute_error")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane.analysis.cohort import Participant
+from labcrane.analysis.presented import in_words, not_presented
 from labcrane.errors import RecordingError
 
 if TYPE_CHECKING:
@@ -121,16 +122,22 @@ def exclusions(movements: "pd.DataFrame") -> "pd.DataFrame":
     names = ["participant", "session", "trial", "attempt", "outcome", "practice"]
     counted = is_result(movements)
     out = movements.reindex(columns=names).loc[~counted].copy()
-    still = without_onset(movements)[~counted]
+    still, unseen = without_onset(movements)[~counted], not_presented(movements)[~counted]
+    shown = [
+        in_words(row) if why else ""
+        for row, why in zip(movements[~counted].to_dict("records"), unseen, strict=True)
+    ]
     out["why"] = [
-        "practice" if row.practice else f"outcome {row.outcome}" + ", no onset" * unmoved
-        for row, unmoved in zip(out.itertuples(index=False), still, strict=True)
+        "practice"
+        if row.practice
+        else f"outcome {row.outcome}" + ", no onset" * unmoved + f", {said}" * bool(said)
+        for row, unmoved, said in zip(out.itertuples(index=False), still, shown, strict=True)
     ]
     return out.drop(columns="practice")
 
 
 def is_result(movements: "pd.DataFrame") -> "pd.Series[bool]":
-    """Return which movements are results: successful, with an onset, and no practice.
+    """Return which movements are results: successful, with an onset, shown, and no practice.
 
     A repeated trial's attempts before the last have the outcome ``repeated``.
     """
@@ -138,7 +145,8 @@ def is_result(movements: "pd.DataFrame") -> "pd.Series[bool]":
 
     if movements.empty:  # sessions that ended before their first result have no columns either
         return pd.Series([], index=movements.index, dtype=bool)
-    return is_done(movements) & (movements["practice"].astype(float) == 0.0)
+    counts = (movements["practice"].astype(float) == 0.0) & ~not_presented(movements)
+    return is_done(movements) & counts
 
 
 def is_done(movements: "pd.DataFrame") -> "pd.Series[bool]":

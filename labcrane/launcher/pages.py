@@ -120,7 +120,9 @@ def _verdict(
         where = f" in {outcome.where}" if outcome.where else ""
         return "bad", f"The session died{where}; what it recorded until then is saved", again
     level = LEVELS[report.verdict.value if report else "PASS"]
-    doubt = "" if level == "ok" else "; look at its time stamps"
+    doubt = "; movements were not shown" if report and report.presented else ""
+    if report and LEVELS[report.of_stamps.value] != "ok":
+        doubt += "; look at its time stamps"
     if outcome.owed:
         worst = "warn" if level == "ok" else level
         return worst, f"The session is saved{doubt}, and not complete: {outcome.owed}", again

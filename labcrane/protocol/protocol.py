@@ -20,6 +20,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from labcrane.analysis.indicator_settings import IndicatorSettings
+from labcrane.analysis.presented import PresentedLimits
 from labcrane.files.model import AtMost, was_run
 from labcrane.files.names import misfit
 from labcrane.files.yaml import YamlFile
@@ -190,6 +191,9 @@ class Protocol(Section):
 
     sync: TimeLimits = TimeLimits()
     """How right the time stamps must be."""
+
+    presented: PresentedLimits = PresentedLimits()
+    """How much of a movement the operator must have been shown."""
 
     design: Design = Design()
     """What is varied between and within participants, and in which order."""

@@ -124,6 +124,7 @@ def _of_study(study: Study, *, simulated: bool) -> dict[str, Any]:
         },
         "indicator": study.protocol.indicator.model_dump(mode="json"),
         "sync": study.protocol.sync.model_dump(mode="json"),
+        "presented": study.protocol.presented.model_dump(mode="json"),
         "trial_units": {
             column: unit
             for task in study.tasks.values()

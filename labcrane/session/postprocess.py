@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from labcrane.analysis.presented import judge_presented
 from labcrane.errors import LabcraneError
 from labcrane.protocol.streams import StreamNeed, TimeLimits
 from labcrane.recording.foreign_streams import RecordedStream
 from labcrane.recording.participant_file.columns import text_of, write_attributes
+from labcrane.recording.participant_file.reader import session_in
 from labcrane.recording.participant_file.recorrect import read_channel, read_stream
 from labcrane.recording.participant_file.session_group import write_sync_report
 from labcrane.recording.participant_file.stream_group import write_time, write_uncorrected
@@ -72,7 +74,9 @@ def conclude(group: "h5py.Group", spaces: Mapping[str, str] = NO_SPACES) -> Sync
     # A session as fast as it goes is without LSL.
     absent = tuple(missing) if group.attrs.get("fast") == "yes" else ()
     never = () if absent else never_came(missing)
-    report = SyncReport(tuple(judged), _loop(group, context, limits), never, absent)
+    with session_in(group) as session:
+        presented = judge_presented(session)
+    report = SyncReport(tuple(judged), _loop(group, context, limits), never, absent, presented)
     write_sync_report(group, report.as_json())
     return report
 

@@ -131,6 +131,7 @@ class SessionView:
         self.stage = STARTING
         self.holds: set[str] = set()
         self.trial: Mapping[str, Value] = {}
+        self.trial_began = 0.0
         self.trials_done = 0
         self.things = ""
         self.counts: Counter[str] = Counter()
@@ -165,7 +166,7 @@ class SessionView:
             case "questionnaire":
                 self._form(what, event.data)
             case "trial":
-                self._trial(what, event.data)
+                self._trial(what, event.time, event.data)
             case "scene":
                 self.things = str(event.data["things"])
             case "consent":
@@ -230,9 +231,9 @@ class SessionView:
             case "order.report" if event.data["refused"] is None:
                 self.reported.append(str(event.data["text"]))
 
-    def _trial(self, what: str, data: Mapping[str, Value]) -> None:
+    def _trial(self, what: str, time: float, data: Mapping[str, Value]) -> None:
         if what == "start":
-            self.trial = data
+            self.trial, self.trial_began = data, time
             self.counts.clear()
             self.reported.clear()
         elif what == "end":

@@ -4,6 +4,7 @@ import json
 import random
 import re
 import threading
+import time
 from pathlib import Path
 
 import pylsl
@@ -24,7 +25,7 @@ from labcrane.web.pictures import Pictures
 from labcrane.web.room import shown
 from labcrane.web.room.bars import groups
 from labcrane.web.room.buttons import answers, buttons
-from labcrane.web.room.condition import STATES, Lamp, lamp_of, state_of
+from labcrane.web.room.condition import STATES, ExpectedSession, Lamp, lamp_of, state_of
 from labcrane.web.room.earlier import FEWEST, Earlier, read_behind
 from labcrane.web.room.sentences import KINDS, SAID, sentence
 from labcrane.web.room.shown import ShownShapes
@@ -37,7 +38,7 @@ from labcrane_sphere.settings import SphereSettings
 
 README = Path(__file__).parents[2] / "README.md"
 TRIAL = {"trial": 1, "attempt": 1, "counted": True}
-PERIOD_S = 1 / 240
+EXPECTED = ExpectedSession(1 / 240, ["operator"])
 
 
 class Punctual:
@@ -104,12 +105,12 @@ def test_at_most_one_button_is_primary_and_those_that_lose_something_ask() -> No
 
 def test_the_lamp_names_what_is_lost_until_it_is_back() -> None:
     lost = BEGUN["fault"]
-    lamp = lamp_of(after(*lost), Punctual(), PERIOD_S)
+    lamp = lamp_of(after(*lost), Punctual(), EXPECTED)
     assert lamp.level == "bad"
     assert lamp.reason == "the controls failed: gone"
     assert "cable" in lamp.remedy
     back = (*lost, ("input.back", {}), ("pause.end", {"by": "input"}))
-    assert lamp_of(after(*back), Punctual(), PERIOD_S) == Lamp("ok", "all is well")
+    assert lamp_of(after(*back), Punctual(), EXPECTED) == Lamp("ok", "all is well")
 
 
 def test_what_a_session_sends_and_cannot_be_drawn_is_said_and_the_next_one_is_drawn_again() -> None:
@@ -126,7 +127,7 @@ def test_what_a_session_sends_and_cannot_be_drawn_is_said_and_the_next_one_is_dr
             assert shapes.hear(bad, scene) == scene
             said = shapes.trouble
             assert said
-            lamp = lamp_of(after(*BEGUN["running"]), Punctual(), PERIOD_S, said)
+            lamp = lamp_of(after(*BEGUN["running"]), Punctual(), EXPECTED, said)
             assert lamp.level == "warn"
             assert said in lamp.reason
         assert shapes.hear(json.dumps({"scene": 4, "situation": 5}), scene) == "4"
@@ -161,24 +162,63 @@ def test_the_lamp_names_every_trigger_that_is_lost() -> None:
         *BEGUN["running"],
         *(("trigger.lost", {"trigger": name, "why": f"{name}: pulled out"}) for name in ("a", "b")),
     ]
-    lamp = lamp_of(after(*lost), Punctual(), PERIOD_S)
+    lamp = lamp_of(after(*lost), Punctual(), EXPECTED)
     assert (lamp.level, lamp.reason) == ("bad", "trigger failed: a: pulled out")
     assert "plug the device in" in lamp.remedy
     lost.append(("trigger.back", {"trigger": "a"}))
-    assert lamp_of(after(*lost), Punctual(), PERIOD_S).reason == "trigger failed: b: pulled out"
+    assert lamp_of(after(*lost), Punctual(), EXPECTED).reason == "trigger failed: b: pulled out"
     lost.append(("trigger.back", {"trigger": "b"}))
-    assert lamp_of(after(*lost), Punctual(), PERIOD_S).level == "ok"
+    assert lamp_of(after(*lost), Punctual(), EXPECTED).level == "ok"
     assert sentence(Event(*lost[1][:1], 0.0, lost[1][1]), str).text == "Trigger a: pulled out"
 
 
 def test_the_lamp_tells_a_late_loop_and_one_that_says_nothing() -> None:
     live = Punctual()
     live.lateness_s = 0.05
-    lamp = lamp_of(after(*BEGUN["running"]), live, PERIOD_S)
+    lamp = lamp_of(after(*BEGUN["running"]), live, EXPECTED)
     assert (lamp.level, "50 ms late" in lamp.reason) == ("warn", True)
     live.silent_s = 3.2
-    lamp = lamp_of(after(*BEGUN["running"]), live, PERIOD_S)
+    lamp = lamp_of(after(*BEGUN["running"]), live, EXPECTED)
     assert (lamp.level, lamp.reason) == ("bad", "no frame of the session for 3 s")
+
+
+def test_the_lamp_tells_of_a_trial_of_which_no_frame_came(monkeypatch: pytest.MonkeyPatch) -> None:
+    live, view = Punctual(), after(("trial.start", TRIAL))
+    live.silent_s = live.lateness_s = None
+    for now, level in ((1.9, "ok"), (2.1, "bad")):
+        monkeypatch.setattr(time, "perf_counter", lambda now=now: now)
+        assert lamp_of(view, live, EXPECTED).level == level
+    assert lamp_of(view, live, EXPECTED).reason == "no frame of the session for 2 s"
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "silent_s", "said"),
+    [
+        (25.0, 0.1, ""),
+        (2.0, 0.4, "shows 2.0 pictures a second, and 15 are needed"),
+        (25.0, 4.0, "has shown no picture for 4 s"),
+        (None, None, "has shown no picture yet"),
+    ],
+)
+def test_the_lamp_tells_of_a_view_of_the_operator_that_shows_too_little(
+    rate_hz: float | None, silent_s: float | None, said: str
+) -> None:
+    view = after(*BEGUN["running"])
+    as_told = {
+        "label": "operator", "condition": "flows", "required": False, "warnings": [],
+        "signals": [], "rate_hz": rate_hz, "silent_s": silent_s,
+        "source_id": "labcrane/study/P001/ses-01/labcrane.feedback.operator",
+    }  # fmt: skip
+    view.hear_of_streams({"streams": [as_told]})
+    lamp = lamp_of(view, Punctual(), EXPECTED)
+    assert (lamp.level, lamp.reason) == (
+        ("bad", f"the operator's view operator {said}") if said else ("ok", "all is well")
+    )
+    assert lamp_of(view, Punctual(), ExpectedSession(1 / 240)).level == "ok", (
+        "a view of somebody else"
+    )
+    view.trial = {}
+    assert lamp_of(view, Punctual(), EXPECTED).level == "ok", "between movements"
 
 
 def test_a_required_stream_that_is_silent_outweighs_the_warning_of_another() -> None:
@@ -188,9 +228,9 @@ def test_a_required_stream_that_is_silent_outweighs_the_warning_of_another() -> 
         {**quiet, "label": "gaze", "condition": "flows", "required": True, "warnings": ["is slow"]},
         {**quiet, "label": "eeg", "condition": "silent", "required": True},
     ]})  # fmt: skip
-    assert lamp_of(view, Punctual(), PERIOD_S).reason == "stream eeg is silent"
+    assert lamp_of(view, Punctual(), EXPECTED).reason == "stream eeg is silent"
     view.streams["streams"][1]["required"] = False
-    assert lamp_of(view, Punctual(), PERIOD_S).reason == "stream gaze is slow"
+    assert lamp_of(view, Punctual(), EXPECTED).reason == "stream gaze is slow"
 
 
 def test_a_stream_that_is_asked_about_has_a_button_for_each_answer() -> None:
@@ -215,18 +255,18 @@ def test_a_stream_that_is_asked_about_has_a_button_for_each_answer() -> None:
     assert answers(asked | {"candidates": []}) == []
     view = after()
     view.hear_of_streams({"streams": [asked]})
-    lamp = lamp_of(view, Punctual(), PERIOD_S)
+    lamp = lamp_of(view, Punctual(), EXPECTED)
     assert (lamp.level, lamp.reason) == ("warn", "stream eeg is asked for")
     assert lamp.remedy == "answer with the buttons beside it"
 
 
 def test_the_lamp_at_the_end_is_what_was_left_behind() -> None:
     view = after(*BEGUN["ended"])
-    assert lamp_of(view, Punctual(), PERIOD_S).reason == "the session is being saved"
+    assert lamp_of(view, Punctual(), EXPECTED).reason == "the session is being saved"
     view.ended = SessionLeft(
         "warn", "The session is saved, and not complete: trial 3", "go on with: x"
     )
-    assert lamp_of(view, Punctual(), PERIOD_S) == Lamp(
+    assert lamp_of(view, Punctual(), EXPECTED) == Lamp(
         "warn", "The session is saved, and not complete: trial 3", "go on with: x"
     )
 

@@ -69,13 +69,15 @@ def record(
     gaze: bool | Sequence[str] | Callable[[FloatArray], FloatArray] = False,
     stated: Sequence[str] = ("screen",),
     eeg: bool = False,
+    shown: Mapping[str, Callable[[float], FloatArray]] | None = None,
 ) -> Path:
     """Record session 1; a program takes the controls, whatever the stamps say.
 
     ``gaze`` is of eyes that name what they look at; or, by the names of cameras, of eyes that look
     somewhere in the window, beside the areas that a view has shown there; or, as a function of
     times on the session's clock, of eyes whose place in the window is known, in pixels. ``stated``
-    has the coordinate system that the header of each stream in pixels states.
+    has the coordinate system that the header of each stream in pixels states. ``shown`` says when
+    each view showed its pictures, by its name, in a session that ended at that time.
     """
     visit = Visit(chosen, participant, 1, data, simulated=simulated, fast=True, pilot=pilot)
     plan = plan_session(chosen, participant, 1)
@@ -89,7 +91,7 @@ def record(
             log.note(Event("session.start", clock.now(), context(visit, plan, rig, run)))
             loop.run(rig, run, sequencer, clock, ScriptedConsole(orders), log, [])
     journals = [visit.journal]
-    if gaze or eeg:
+    if gaze or eeg or shown:
         journals.append(visit.streams_journal)
         with XdfWriter(visit.streams_journal) as writer:
             if gaze is True:
@@ -98,6 +100,8 @@ def record(
                 _gaze_at(writer, clock.now(), gaze)
             elif gaze:
                 _gaze_in_window(writer, clock.now(), gaze, stated)
+            for name, pictures in (shown or {}).items():
+                _pictures(writer, name, pictures(clock.now()))
             if eeg:
                 events = read_xdf(visit.journal).stream(EVENTS).stamps
                 _eeg(writer, clock.now(), events)
@@ -162,6 +166,15 @@ def _gaze_at(writer: XdfWriter, until: float, where: Callable[[FloatArray], Floa
     header = StreamHeader("eyes", "Gaze", channels, "double64", 120.0, source_id="eyes")
     time = np.arange(90.0, until, 1.0 / 120.0)
     _stream(writer, header, time, OFFSET_S, where(time))
+
+
+def _pictures(writer: XdfWriter, name: str, time: FloatArray) -> None:
+    """Write what a view says of its pictures."""
+    header = StreamHeader(
+        f"labcrane.feedback.{name}", "Feedback", (Channel("frame.tick", "1"),), "double64",
+        source_id=name,
+    )  # fmt: skip
+    _stream(writer, header, time, 0.0, np.zeros((len(time), 1)))
 
 
 EEG_HZ = 250.0

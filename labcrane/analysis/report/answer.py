@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.presented import not_presented
 from labcrane.analysis.quality import is_result, without_onset
 from labcrane.analysis.report.factors import (
     DISTANCE,
@@ -234,6 +235,12 @@ def _exclusions(everything: "pd.DataFrame") -> str:
     out = count - int(is_result(everything).sum()) if count else 0
     share = f" ({out / count:.1%})" if count else ""
     said = f"{out} of {count} movements count for no average{share}; each is listed with why."
+    unseen = everything[not_presented(everything)]
+    if len(unseen):
+        people = unseen["participant"].nunique()
+        who = f"{people} {'participant' if people == 1 else 'participants'}"
+        said += f" {len(unseen)} of {who} because the operator was shown too little of them: "
+        said += f"{listed(unseen)}."
     still = everything[without_onset(everything)]
     return f"{said} Without an onset: {listed(still)}." if len(still) else said
 

@@ -10,6 +10,7 @@ from labcrane.analysis.gaze import fixations_of, with_unseen_areas
 from labcrane.analysis.gaze_streams import unmeasured_of
 from labcrane.analysis.measures import DEFAULTS, MeasureSettings, measures_of
 from labcrane.analysis.parallel import work
+from labcrane.analysis.presented import PRESENTED
 from labcrane.analysis.quality import (
     exclusions,
     is_result,
@@ -516,11 +517,12 @@ def _definitions(cohort: Cohort, everything: "pd.DataFrame") -> "pd.DataFrame":
     for person in cohort.included:
         units |= person.context.get("trial_units", {})
         recorded |= person.context.get("trial_definitions", {})
-    rows = [(name, unit, meaning) for name, (unit, meaning) in MEASURES.items()]
+    computed = {**MEASURES, **PRESENTED}
+    rows = [(name, unit, meaning) for name, (unit, meaning) in computed.items()]
     rows += [
         (name, units.get(name, ""), recorded[name])
         for name in map(str, everything)
-        if name in recorded and name not in MEASURES
+        if name in recorded and name not in computed
     ]
     return pd.DataFrame(rows, columns=["measure", "unit", "meaning"])
 

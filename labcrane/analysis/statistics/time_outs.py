@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from labcrane.analysis.presented import not_presented
 from labcrane.analysis.quality import is_done
 from labcrane.types import FloatArray
 
@@ -49,13 +50,13 @@ def time_outs(movements: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
     """Return for each condition how many were done and given up, and how long they took.
 
     There is at least one column to go ``by``. ``seconds`` count from the trial's start, pauses left
-    out. Practice and repeated attempts are not in it; trials that were skipped or ended by somebody
-    are counted as neither, and so are successes in which nothing moved.
+    out. Practice, repeated attempts and what was not shown are not in it; trials that were skipped
+    or ended by somebody are counted as neither, and so are successes in which nothing moved.
     """
     import pandas as pd
 
     own = movements[(movements["practice"].astype(float) == 0.0)].copy()
-    own = own[own["outcome"] != "repeated"]
+    own = own[(own["outcome"] != "repeated") & ~not_presented(own)]
     own["seconds"] = trial_seconds(own)
     rows = []
     for level, part in own.groupby(list(by)):

@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +18,7 @@ from labcrane.recording.journal import GROUPS
 from labcrane.recording.participant_file.columns import CHUNK, holds_texts, text_of, texts_of
 from labcrane.recording.participant_file.session_group import SYNC_REPORT
 from labcrane.recording.participant_file.stream_group import BASES
-from labcrane.recording.participant_file.writer import group_name, reading
+from labcrane.recording.participant_file.writer import group_name, held, reading
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.types import FloatArray
 
@@ -457,6 +458,14 @@ def open_recording(path: Path | str) -> Recording:
             "journals, if there are any"
         )
     return Recording(path)
+
+
+@contextmanager
+def session_in(group: "h5py.Group") -> Iterator[SessionRecord]:
+    """Give the session of a group of a participant file that is open, perhaps for writing."""
+    path = Path(group.file.filename)
+    with held(path, group.file):
+        yield SessionRecord(_attributes(group), path, group.name.removeprefix("/"))
 
 
 def _mapping(text: str) -> dict[str, Any]:

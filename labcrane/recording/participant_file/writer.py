@@ -276,10 +276,10 @@ def reading(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
     RecordingError
         It cannot be read, is none, or is damaged where it was read.
     """
-    held = _HELD.get()
+    kept = _HELD.get()
     try:
-        if held is not None and held[0] == path and cached:
-            yield held[1]
+        if kept is not None and kept[0] == path and cached:
+            yield kept[1]
             return
         with opened(path, cached=cached) as file:
             yield file
@@ -303,12 +303,18 @@ def kept_open(path: Path) -> Iterator[None]:
     RecordingError
         It cannot be read, or is none.
     """
-    with opened(path) as file:
-        before = _HELD.set((path, file))
-        try:
-            yield
-        finally:
-            _HELD.reset(before)
+    with opened(path) as file, held(path, file):
+        yield
+
+
+@contextmanager
+def held(path: Path, file: "h5py.File") -> Iterator[None]:
+    """Read a participant file, while the block lasts, from an opening, perhaps for writing."""
+    before = _HELD.set((path, file))
+    try:
+        yield
+    finally:
+        _HELD.reset(before)
 
 
 def _refuse_less(path: Path, old: "h5py.File", session: _Session) -> None:

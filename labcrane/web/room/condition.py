@@ -1,15 +1,20 @@
 """Condition of a session: which state it is in, and one lamp with its reason in words."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
+from labcrane.analysis.presented import LOG, PresentedLimits
 from labcrane.web.live import Live
 from labcrane.web.state import SessionView
 
 EXAMINER = "examiner"
 SILENT_S = 1.0
 """A running session sends frames all the time; after so long without one it is said."""
+
+FIRST_S = 2.0
+"""How long after a trial's beginning the first frame may come: the page may have to find it."""
 
 STATES = (
     "starting", "consent", "waiting", "running", "paused", "fault", "break", "fixation",
@@ -34,6 +39,7 @@ REMEDIES: Mapping[str, str] = {
     "stream": "check the device and its program; the recorder goes on looking for it",
     "asked": "answer with the buttons beside it",
     "feedback": "it is started again; end the session if it keeps failing",
+    "picture": "pause; look at the operator's window, the graphics driver and other programs",
 }
 """What to do about each kind of fault."""
 
@@ -57,7 +63,26 @@ def state_of(view: SessionView) -> str:
     return view.stage.state
 
 
-def lamp_of(view: SessionView, live: Live, period_s: float, trouble: str = "") -> Lamp:
+@dataclass(frozen=True, slots=True)
+class ExpectedSession:
+    """What a study promises while it runs.
+
+    Attributes
+    ----------
+    period_s
+        From one tick to the next, in seconds.
+    views
+        Names of the operator's views.
+    presented
+        How much they must show.
+    """
+
+    period_s: float
+    views: Sequence[str] = ()
+    presented: PresentedLimits = field(default_factory=PresentedLimits)
+
+
+def lamp_of(view: SessionView, live: Live, expected: ExpectedSession, trouble: str = "") -> Lamp:
     """Return the lamp of a session: the worst of what is known.
 
     ``trouble`` is why what the session sends cannot be drawn, or nothing.
@@ -68,13 +93,12 @@ def lamp_of(view: SessionView, live: Live, period_s: float, trouble: str = "") -
         return Lamp("bad", view.alarm, "decide with the participant")
     for (kind, _), why in view.faults.items():
         return Lamp("bad", why, REMEDIES.get(kind, ""))
-    silent = live.silent_s
-    if view.trial and silent is not None and silent > SILENT_S:
-        return Lamp(
-            "bad", f"no frame of the session for {silent:.0f} s", "look at the terminal; the "
-            "session is ended and saved by itself if it hangs",
-        )  # fmt: skip
-    found = [*_of_streams(view.streams), *_of_the_loop(live, period_s)]
+    found = [
+        *_of_frames(view, live),
+        *_of_pictures(view, expected),
+        *_of_streams(view.streams),
+        *_of_the_loop(live, expected.period_s),
+    ]
     if trouble:
         why = f"what is drawn here may not be as it is: {trouble}"
         found.append(Lamp("warn", why, "the session and its views go on; tell who keeps labcrane"))
@@ -90,6 +114,30 @@ def _at_the_end(view: SessionView) -> Lamp:
     if ended is None:
         return Lamp("ok", "the session is being saved", "leave the computer on")
     return Lamp(ended.level, ended.verdict, ended.remedy)
+
+
+def _of_frames(view: SessionView, live: Live) -> Iterator[Lamp]:
+    """Yield that frames do not come; the first one has a while from the trial's beginning."""
+    silent, patience = live.silent_s, SILENT_S
+    if silent is None:
+        silent, patience = time.perf_counter() - view.trial_began, FIRST_S
+    if view.trial and silent > patience:
+        yield Lamp(
+            "bad", f"no frame of the session for {silent:.0f} s", "look at the terminal; the "
+            "session is ended and saved by itself if it hangs",
+        )  # fmt: skip
+
+
+def _of_pictures(view: SessionView, expected: ExpectedSession) -> Iterator[Lamp]:
+    """Yield what is wrong with the operator's views while a trial runs."""
+    if not view.trial or time.perf_counter() - view.trial_began < FIRST_S:
+        return
+    views = {LOG + name: name for name in expected.views}
+    for stream in view.streams.get("streams", ()):
+        if (name := views.get(str(stream.get("source_id", "")).rpartition("/")[2])) is None:
+            continue
+        if why := expected.presented.complaint(stream["rate_hz"], stream["silent_s"]):
+            yield Lamp("bad", f"the operator's view {name} {why}", REMEDIES["picture"])
 
 
 def _of_streams(status: Mapping[str, Any]) -> list[Lamp]:

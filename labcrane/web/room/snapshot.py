@@ -5,6 +5,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from labcrane.analysis.presented import LOG, operators_views
 from labcrane.core.records import Event
 from labcrane.core.signals import Signal
 from labcrane.design.counts import TrialCounts
@@ -13,16 +14,13 @@ from labcrane.protocol.study import Study
 from labcrane.web.page import PageContext
 from labcrane.web.room.bars import groups
 from labcrane.web.room.buttons import answers, buttons
-from labcrane.web.room.condition import lamp_of, state_of
+from labcrane.web.room.condition import ExpectedSession, lamp_of, state_of
 from labcrane.web.room.earlier import Earlier
 from labcrane.web.room.sentences import KINDS, sentence
 from labcrane.web.room.sliders import sliders
 
 NEWEST = 120
 """Events that are listed."""
-
-OWN = "labcrane.feedback"
-"""How the names of what views and sounds say of themselves begin."""
 
 STATES: Mapping[str, str] = {
     "starting": "Getting ready",
@@ -52,7 +50,15 @@ class Snapshot:
         self._told: list[tuple[Event, dict[str, Any]]] = []
         self._number = 0
         self._began: float | None = None
-        self._period_s = 1.0 / context.study.protocol.rate_hz
+        study = context.study
+        views = {
+            f"views.{name}": choice.described(study.path.parent)
+            for name, choice in study.views.items()
+        }
+        self._period_s = 1.0 / study.protocol.rate_hz
+        self._expected = ExpectedSession(
+            self._period_s, operators_views(views), study.protocol.presented
+        )
 
     def parts(self) -> dict[str, Any]:
         """Return everything that is shown, by name."""
@@ -64,7 +70,7 @@ class Snapshot:
         state = state_of(session)
         held = f" · HELD by {', '.join(sorted(session.holds))}" if session.holds else ""
         trouble = context.shown.trouble or context.live.trouble
-        lamp = lamp_of(session, context.live, self._period_s, trouble)
+        lamp = lamp_of(session, context.live, self._expected, trouble)
         return {
             "who": f"{context.participant} · session {plan.number}",
             "condition": " · ".join(filter(None, [
@@ -103,8 +109,8 @@ class Snapshot:
             "late": [[round(1000 * part, 2) for part in band] for band in live.bands],
             "lateText": self._lateness(),
             "tickMs": 1000 * self._period_s,
-            "streams": [one for name, one in streams if not name.startswith(OWN)],
-            "presented": [one for name, one in streams if name.startswith(OWN)],
+            "streams": [one for name, one in streams if not name.startswith(LOG)],
+            "presented": [one for name, one in streams if name.startswith(LOG)],
             "settings": self._settings(),
             "kinds": list(KINDS),
             "events": self._events(),

@@ -1,5 +1,7 @@
 """Sync report of a session: how right its time stamps are, what to do where they are not.
 
+It says too of which movements the operator was shown too little.
+
 Made at the end of a session, before the participant leaves; kept in the participant file.
 """
 
@@ -54,16 +56,24 @@ class SyncReport:
         What is to be said of streams that never came.
     absent
         Streams that are not there in a rehearsal, by label: nothing of them can have failed.
+    presented
+        What is to be said of movements of which the operator was shown too little.
     """
 
     streams: tuple[StreamReport, ...]
     loop: LoopReport | None = None
     missing: tuple[Finding, ...] = field(default_factory=tuple)
     absent: tuple[str, ...] = ()
+    presented: tuple[Finding, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
         """The worst of all."""
+        return worst([self.of_stamps, *(one.verdict for one in self.presented)])
+
+    @property
+    def of_stamps(self) -> Verdict:
+        """The worst of what was found of time stamps."""
         loop = [] if self.loop is None else [self.loop.verdict]
         return worst(
             [*(one.verdict for one in self.streams), *loop, *(one.verdict for one in self.missing)]
@@ -72,8 +82,9 @@ class SyncReport:
     def as_json(self) -> dict[str, Any]:
         """Return what JSON can hold; what is not known is null."""
         plain = {name: finite(each) for name, each in asdict(self).items()}
-        if not self.absent:  # as in recordings of before
-            del plain["absent"]
+        for name in ("absent", "presented"):
+            if not plain[name]:  # as in recordings of before
+                del plain[name]
         return {"verdict": self.verdict.value, **plain}
 
     def table(self) -> list[tuple[str, ...]]:
@@ -86,6 +97,7 @@ class SyncReport:
         found += [(f"{one.name}: ", finding) for one in self.streams for finding in one.findings]
         if self.loop is not None:
             found += [("loop: ", finding) for finding in self.loop.findings]
+        found += [("view: ", finding) for finding in self.presented]
         order = list(Verdict)
         found.sort(key=lambda pair: -order.index(pair[1].verdict))
         return [f"{f.verdict} {whose}{f.text}; {f.advice}" for whose, f in found]

@@ -1,0 +1,238 @@
+"""Presentation of movements: what the operator was shown of each, and whether that was too little.
+
+A view says of each picture when it was shown (``labcrane.feedback.NAME``), and the session when a
+view or sound had failed and was back. Lamp, sync report and results ask :class:`PresentedLimits`.
+"""
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from pydantic import PositiveFloat
+
+from labcrane.core.findings import Finding, Verdict
+from labcrane.core.settings import Settings
+
+if TYPE_CHECKING:  # a protocol is checked without loading what computes
+    import pandas as pd
+
+    from labcrane.recording.participant_file.reader import SessionRecord
+    from labcrane.types import FloatArray
+
+LOG = "labcrane.feedback."
+SILENT_S = 2.0
+"""The recorder says once a second how streams are: a view that hangs is told from one about which
+nothing was heard yet after so long."""
+
+FAILED = 0.05
+"""Share of a session's movements above which the data deserve a look, and not the report alone."""
+
+NAMED = 6
+"""Movements named one by one in a sentence."""
+
+
+class PresentedLimits(Settings):
+    """How much of a movement the operator must have been shown; with less it counts for nothing."""
+
+    min_hz: PositiveFloat = 15.0
+    """Fewest pictures a second, over the whole movement. Below about 15 people steer and place
+    measurably worse (Chen and Thropp, 2007, IEEE Transactions on Systems, Man, and Cybernetics A
+    37, 1063-1076); a processor that draws reaches 25."""
+
+    max_gap_s: PositiveFloat = 0.25
+    """Longest time without a new picture, in seconds: about a visual reaction time."""
+
+    def too_little(self, rate_hz: float, longest_s: float) -> bool:
+        """Whether so few pictures a second, or so long without one, is too little."""
+        return rate_hz < self.min_hz or longest_s > self.max_gap_s
+
+    def complaint(self, rate_hz: float | None, silent_s: float | None) -> str:
+        """Say what is wrong with a view at this moment, in a movement; nothing where it is right.
+
+        Parameters
+        ----------
+        rate_hz
+            Pictures a second over the last seconds; None where it is not known.
+        silent_s
+            How long ago the last picture was, in seconds; None before the first.
+        """
+        if silent_s is None:
+            return "has shown no picture yet"
+        if silent_s > max(SILENT_S, self.max_gap_s):
+            return f"has shown no picture for {silent_s:.0f} s"
+        if rate_hz is not None and rate_hz < self.min_hz:
+            return f"shows {rate_hz:.1f} pictures a second, and {self.min_hz:g} are needed"
+        return ""
+
+
+PRESENTED: Mapping[str, tuple[str, str]] = {
+    "pictures": (
+        "1",
+        "pictures that the operator's view showed from the trial's start to its end, pauses left "
+        "out; of several views, those of the one that showed fewest",
+    ),
+    "longest_without_picture": (
+        "s",
+        "longest time without a new picture, pauses left out; that from the start to the first one "
+        "and from the last one to the end count too",
+    ),
+    "feedback_lost": (
+        "s",
+        "how long a view or sound of the operator had failed and was not back, pauses left out",
+    ),
+    "presentation_failed": (
+        "1",
+        "1 where that is less than the protocol's presented: asks for: it counts for no average",
+    ),
+}
+"""Unit and meaning of the columns of :func:`presented`."""
+
+
+def operators_views(components: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return the names of the views that are on a screen before the operator.
+
+    Parameters
+    ----------
+    components
+        What a study is made of, as its record has it: ``views.NAME`` with its settings.
+    """
+    found = []
+    for part, choice in components.items():
+        kind, _, name = part.partition(".")
+        settings = choice.get("settings", {})
+        others = settings.get("seen_by", "operator") != "operator"
+        if kind == "views" and not others and settings.get("display") != "hidden":
+            found.append(name)
+    return found
+
+
+def presented(session: "SessionRecord") -> "pd.DataFrame | None":
+    """Return what the operator was shown of each movement, in the rows of the trial table.
+
+    None where nothing was to be shown: the study has no view or sound for the operator, or the
+    session was run without. A view that never showed a picture has shown 0.
+    """
+    import pandas as pd
+
+    trials, events = session.trials, session.events
+    components = session.context.get("components", {})
+    views = operators_views(components)
+    own = {
+        *views,
+        *(part.removeprefix("feedback.") for part in components if part.startswith("feedback.")),
+    }
+    told = events[events["name"].isin(["feedback.lost", "feedback.ready"])]
+    started = {str(data["what"]) for data in told["data"]}
+    views = [name for name in views if name in started or LOG + name in session.streams]
+    if trials.empty or not (views or own & started):
+        return None
+    clock = _Clock(session)
+    spans = [clock.at(trials[edge].to_numpy(float)) for edge in ("started", "ended")]
+    table = pd.DataFrame(index=trials.index, columns=list(PRESENTED), dtype=float)
+    if views:
+        shown = [_shown(session, name, clock, *spans) for name in views]
+        table["pictures"] = pd.DataFrame([count for count, _ in shown]).min().to_numpy()
+        longest = pd.DataFrame([gap for _, gap in shown]).max()
+        table["longest_without_picture"] = longest.to_numpy()
+        limits = PresentedLimits.model_validate(session.context.get("presented", {}))
+        table["presentation_failed"] = [
+            float(limits.too_little(count / max(until - since, 1.0 / clock.rate_hz), gap))
+            for count, gap, since, until in zip(table["pictures"], longest, *spans, strict=True)
+        ]
+    lost = [clock.at(edges) for edges in _outages(told, own)]
+    table["feedback_lost"] = [
+        sum(max(0.0, min(until, over) - max(since, began)) for began, over in lost)
+        for since, until in zip(*spans, strict=True)
+    ]
+    return table
+
+
+class _Clock:
+    """Time of a session in which pauses take none, in seconds."""
+
+    def __init__(self, session: "SessionRecord") -> None:
+        import numpy as np
+
+        loop = session.streams["loop"].columns(("due", "paused"))
+        self.rate_hz = float(session.attrs["rate_hz"])
+        self._due, self._held = loop["due"], loop["paused"] != 0.0
+        before = np.cumsum(~self._held) - ~self._held
+        self._running = before / self.rate_hz
+
+    def at(self, times: "FloatArray | Sequence[float]") -> "FloatArray":
+        """Return the time without pauses at times on the session's clock."""
+        import numpy as np
+
+        return np.asarray(np.interp(times, self._due, self._running))
+
+    def running(self, times: "FloatArray") -> "FloatArray":
+        """Return the same of those times that are in the session, and in no pause."""
+        import numpy as np
+
+        times = times[(times >= self._due[0]) & (times <= self._due[-1])]
+        tick = np.searchsorted(self._due, times, side="right") - 1
+        return self.at(times[~self._held[tick]])
+
+
+def _shown(
+    session: "SessionRecord", name: str, clock: _Clock, since: "FloatArray", until: "FloatArray"
+) -> "tuple[list[int], list[float]]":
+    """Return how many pictures a view showed of each movement, and the longest time without one."""
+    import numpy as np
+
+    stream = session.streams.get(LOG + name)
+    shown = clock.running(np.empty(0) if stream is None else np.sort(stream.time))
+    edges = np.searchsorted(shown, since), np.searchsorted(shown, until, side="right")
+    counts, gaps = [], []
+    for first, last, began, over in zip(*edges, since, until, strict=True):
+        counts.append(int(last - first))
+        gaps.append(float(np.diff(np.r_[began, shown[first:last], over]).max()))
+    return counts, gaps
+
+
+def _outages(told: "pd.DataFrame", own: set[str]) -> list[tuple[float, float]]:
+    """Return from when to when something of the operator's had failed, on the session's clock."""
+    found, lost, began = [], set[str](), 0.0
+    for name, time, data in zip(told["name"], told["time"], told["data"], strict=True):
+        before = bool(lost)
+        if name == "feedback.lost":
+            lost |= {str(data["what"])} & own
+        else:
+            lost.discard(str(data["what"]))
+        if lost and not before:
+            began = float(time)
+        elif before and not lost:
+            found.append((began, float(time)))
+    return [*found, (began, float("inf"))] if lost else found
+
+
+def not_presented(movements: "pd.DataFrame") -> "pd.Series[bool]":
+    """Return of which movements the operator was shown too little."""
+    import pandas as pd
+
+    if "presentation_failed" not in movements:
+        return pd.Series(data=False, index=movements.index, dtype=bool)
+    return movements["presentation_failed"] == 1.0
+
+
+def in_words(movement: Mapping[Hashable, Any]) -> str:
+    """Return what was shown of a movement: ``12 pictures shown, none for 3.21 s``."""
+    gap = movement["longest_without_picture"]
+    return f"{movement['pictures']:.0f} pictures shown, none for {gap:.2f} s"
+
+
+def judge_presented(session: "SessionRecord") -> tuple[Finding, ...]:
+    """Return what is to be said of movements of which the operator was shown too little."""
+    table = presented(session)
+    if table is None or not (failed := not_presented(table)).any():
+        return ()
+    rows = session.trials[["trial"]].join(table)[failed].to_dict("records")
+    said = [f"trial {row['trial']:g}: {in_words(row)}" for row in rows[:NAMED]]
+    more = f"; and {len(rows) - NAMED} more" if len(rows) > NAMED else ""
+    text = (
+        f"of {len(rows)} of {len(table)} movements the operator was shown too little, and they "
+        f"count for no average ({'; '.join(said)}{more})"
+    )
+    advice = "close other programs, look at the graphics driver, or choose a lower quality"
+    return (
+        Finding(Verdict.FAIL if len(rows) > FAILED * len(table) else Verdict.WARN, text, advice),
+    )

@@ -1,0 +1,213 @@
+"""What the operator was shown of each movement, and which movements that leaves out."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import labcrane as lab
+from labcrane.analysis.codebook import trial_codebook
+from labcrane.analysis.measures import measure_session
+from labcrane.analysis.presented import (
+    PRESENTED,
+    PresentedLimits,
+    not_presented,
+    operators_views,
+    presented,
+)
+from labcrane.analysis.quality import exclusions, is_result
+from labcrane.analysis.report.answer import _exclusions
+from labcrane.analysis.statistics.time_outs import time_outs
+from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Message, Order
+from results.recorded import STUDY, record, study
+from results.synthetic import cohort_of_36
+
+VIEWED = STUDY.replace("tasks:\n", "views: {cab: {use: view}}\ntasks:\n", 1)
+RATE_HZ = 120
+
+
+def recorded(
+    folder: Path,
+    pictures: Mapping[str, np.ndarray],
+    orders: Mapping[int, Sequence[Message]] | None = None,
+    text: str = VIEWED,
+) -> SessionRecord:
+    shown = {name: lambda _, times=times: times for name, times in pictures.items()}
+    path = record(study(folder, text), folder / "data", "P001", orders=orders, shown=shown)
+    return lab.open_recording(path).session(1)
+
+
+def drawn(seed: int, rate_hz: float = 40.0) -> np.ndarray:
+    """Return when pictures were shown: about so many a second, and four outages of up to 4 s."""
+    random = np.random.default_rng(seed)
+    shown = 95.0 + np.cumsum(random.gamma(4.0, 0.25 / rate_hz, 10_000))
+    for began in random.uniform(100.0, 125.0, 4):
+        shown = shown[(shown < began) | (shown > began + random.uniform(0.3, 4.0))]
+    return shown
+
+
+def walked(session: SessionRecord, shown: np.ndarray) -> list[tuple[int, float]]:
+    """Return pictures and longest time without one of each trial, tick by tick as they went by."""
+    loop = session.streams["loop"].data
+    found = []
+    for _, row in session.trials.iterrows():
+        count, without, longest = 0, 0, 0
+        for due, paused in zip(loop["due"], loop["paused"], strict=True):
+            if paused or not row["started"] <= due < row["ended"] - 1e-9:
+                continue
+            new = int(((shown >= due) & (shown < due + 1 / RATE_HZ)).sum())
+            count, without = count + new, 0 if new else without + 1
+            longest = max(longest, without)
+        found.append((count, longest / RATE_HZ))
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_what_was_shown_of_a_movement_is_what_goes_by_tick_by_tick(
+    tmp_path: Path, seed: int
+) -> None:
+    shown = drawn(seed)
+    pauses = {800: [Command(Order.PAUSE)], 1100: [Command(Order.START)]}
+    session = recorded(tmp_path, {"cab": shown}, pauses)
+    assert session.trials["paused"].max() == pytest.approx(300 / RATE_HZ, abs=1.5 / RATE_HZ)
+    table = presented(session)
+    assert table is not None
+    (counts, longest) = zip(*walked(session, shown), strict=True)
+    assert np.abs(table["pictures"] - np.array(counts)).max() <= 1  # at the edge of a pause
+    np.testing.assert_allclose(table["longest_without_picture"], longest, atol=2.01 / RATE_HZ)
+    seconds = session.trials["ended"] - session.trials["started"] - session.trials["paused"]
+    failed = (table["longest_without_picture"] > 0.25) | (table["pictures"] / seconds < 15.0)
+    assert table["presentation_failed"].tolist() == failed.astype(float).tolist()
+    assert 0 < failed.sum() < len(table)
+
+
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory: pytest.TempPathFactory) -> tuple[SessionRecord, pd.Series]:
+    """Return a session whose second view stood still for 2 s in its third trial, and that trial."""
+    folder = tmp_path_factory.mktemp("stopped")
+    first = recorded(folder / "before", {"cab": drawn(1)})
+    third = first.trials.iloc[2]
+    still = third["started"] + 0.5
+    whole = np.arange(90.0, 400.0, 1 / 60)
+    gone = whole[(whole < still) | (whole >= still + 2.0)]
+    text = VIEWED.replace("{cab: {use: view}}", "{cab: {use: view}, side: {use: view}}")
+    return recorded(folder, {"cab": whole, "side": gone}, text=text), third
+
+
+def test_a_movement_is_left_out_by_reason_where_one_of_two_views_stood_still(
+    stopped: tuple[SessionRecord, pd.Series],
+) -> None:
+    session, third = stopped
+    table = measure_session(session).assign(participant="P001", session=1)
+    assert table.loc[not_presented(table), "trial"].tolist() == [third["trial"]]
+    row = table[not_presented(table)].iloc[0]
+    seconds = third["ended"] - third["started"]
+    assert row["longest_without_picture"] == pytest.approx(2.0, abs=2 / 60)
+    assert row["pictures"] == pytest.approx((seconds - 2.0) * 60, abs=2)
+    others = table[~not_presented(table)]
+    assert others["longest_without_picture"].max() == pytest.approx(1 / 60, abs=1e-3)
+    (why,) = exclusions(table)["why"]
+    assert why == f"outcome success, {row['pictures']:.0f} pictures shown, none for 2.02 s"
+    assert (is_result(table) == ~not_presented(table)).all()
+
+
+def test_the_sync_report_names_movements_that_were_not_shown(
+    stopped: tuple[SessionRecord, pd.Series],
+) -> None:
+    session, third = stopped
+    (finding,) = session.sync_report["presented"]
+    assert session.sync_report["verdict"] == finding["verdict"] == "FAIL"  # 1 of 8 is over 5 %
+    assert (
+        f"of 1 of {len(session.trials)} movements the operator was shown too little"
+        in (finding["text"])
+    )
+    assert f"trial {third['trial']:g}: " in finding["text"]
+    assert "none for 2.02 s" in finding["text"]
+
+
+def test_every_column_of_what_was_shown_is_in_the_codebook(
+    stopped: tuple[SessionRecord, pd.Series],
+) -> None:
+    book = trial_codebook(measure_session(stopped[0]), stopped[0]).set_index("column")
+    for name, (unit, meaning) in PRESENTED.items():
+        assert tuple(book.loc[name, ["unit", "description"]]) == (unit, meaning)
+
+
+@pytest.mark.slow
+def test_the_protocol_says_how_much_is_too_little(tmp_path: Path) -> None:
+    shown = np.arange(90.0, 400.0, 1 / 20)
+    for limits, failed in (("", 0.0), ("presented: {min_hz: 30}\n", 1.0),
+                           ("presented: {max_gap_s: 0.04}\n", 1.0)):  # fmt: skip
+        folder = tmp_path / str(len(limits))
+        session = recorded(folder, {"cab": shown}, text=VIEWED + limits)
+        assert set(measure_session(session)["presentation_failed"]) == {failed}
+
+
+@pytest.mark.slow
+def test_time_without_a_view_counts_from_its_failure_until_it_shows_again(tmp_path: Path) -> None:
+    orders = {800: [FeedbackLost("cab", "it hangs")], 920: [FeedbackReady("cab", "renderer x")]}
+    session = recorded(tmp_path, {"cab": np.arange(90.0, 400.0, 1 / 60)}, orders)
+    lost = measure_session(session)["feedback_lost"]
+    assert lost.iloc[0] == pytest.approx(1.0, abs=1 / RATE_HZ)
+    assert set(lost.iloc[1:]) == {0.0}
+
+
+@pytest.mark.slow
+def test_a_view_that_never_showed_a_picture_has_shown_none_of_any_movement(tmp_path: Path) -> None:
+    session = recorded(tmp_path, {}, {5: [FeedbackLost("cab", "no driver")]})
+    table = measure_session(session)
+    assert set(table["pictures"]) == {0.0}
+    assert not_presented(table).all()
+    seconds = session.trials["ended"] - session.trials["started"]
+    np.testing.assert_allclose(table["longest_without_picture"], seconds, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_where_nothing_was_to_be_shown_nothing_is_missing(tmp_path: Path) -> None:
+    hidden = VIEWED.replace("{use: view}", "{use: view, display: hidden}")
+    others = VIEWED.replace("{use: view}", "{use: view, seen_by: examiner}")
+    for number, (text, pictures) in enumerate(
+        ((STUDY, {}), (VIEWED, {}), (hidden, {"cab": drawn(1)}), (others, {"cab": drawn(1)}))
+    ):
+        session = recorded(tmp_path / str(number), pictures, text=text)
+        table = measure_session(session)
+        assert not set(PRESENTED) & set(table), text
+        assert is_result(table).all()
+        assert "presented" not in session.sync_report
+
+
+def test_only_views_on_a_screen_before_the_operator_are_the_operator_s() -> None:
+    own = {"use": "view", "settings": {"seen_by": "operator", "display": "window"}}
+    assert operators_views({
+        "views.cab": own,
+        "views.plain": {"use": "someones_view"},
+        "views.desk": {"use": "view", "settings": {"seen_by": "examiner"}},
+        "views.film": {"use": "view", "settings": {"display": "hidden"}},
+        "feedback.ball": {"use": "sphere"},
+    }) == ["cab", "plain"]  # fmt: skip
+
+
+def test_what_was_not_shown_is_no_success_and_no_time_out_and_is_told_in_the_answer() -> None:
+    table = cohort_of_36().assign(outcome="success", practice=0.0, session=1.0, attempt=1.0)
+    table = table.assign(started=0.0, ended=3.0, presentation_failed=np.nan)
+    table.loc[(table["participant"] == "P003") & (table["trial"] < 3), "presentation_failed"] = 1.0
+    table.loc[table["participant"] == "P004", "presentation_failed"] = 0.0
+    assert time_outs(table, ["distance"])["trials"].sum() == len(table) - 2
+    assert _exclusions(table).endswith(
+        "2 of 1 participant because the operator was shown too little of them: "
+        "P003 trial 1, P003 trial 2."
+    )
+
+
+def test_a_view_is_complained_about_as_it_is_now() -> None:
+    limits = PresentedLimits()
+    assert limits.complaint(24.6, 0.2) == ""
+    assert limits.complaint(None, 0.2) == ""
+    assert limits.complaint(2.04, 0.4) == "shows 2.0 pictures a second, and 15 are needed"
+    assert limits.complaint(24.6, 3.2) == "has shown no picture for 3 s"
+    assert limits.complaint(None, None) == "has shown no picture yet"
+    assert PresentedLimits(max_gap_s=5.0).complaint(24.6, 3.2) == ""
