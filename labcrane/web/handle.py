@@ -32,8 +32,8 @@ for a moment, and on a busy computer for some seconds."""
 class PageHandle:
     """Keeps the page process running for as long as the run lasts.
 
-    A page that hangs never makes the launcher wait. Events are kept: a page that is started again
-    is told all of them.
+    A page that hangs never makes the launcher wait. Events are kept, and the last status of the
+    streams: a page that is started again is told all of them, also after the recorder has ended.
 
     Parameters
     ----------
@@ -57,6 +57,7 @@ class PageHandle:
         self._say = say
         self._streams = streams
         self._told: list[Event | Report] = []
+        self._status: dict[str, Any] = {}
         self._browsers = 0
         self._left_at = -math.inf
         self._closed = threading.Event()
@@ -124,7 +125,8 @@ class PageHandle:
                 self._say("the page keeps dying; the run goes on without it")
                 return
             if not self._process.waiting:  # the newest status, when all before it has gone
-                self._process.tell(Streams(self._streams()))
+                self._status = self._streams() or self._status
+                self._process.tell(Streams(self._status))
 
     def _restart(self) -> bool:
         with self._lock:

@@ -6,14 +6,20 @@ import re
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pylsl
 import pytest
+from faults.sessions import wait_for
 from governed import TODAY, Lab
+from pages.room import STUDY
 
 from labcrane.cli.terminal import KEYS as TERMINAL_KEYS
 from labcrane.core.records import Event
+from labcrane.design.plan import plan_session
 from labcrane.participants.enrolment import exclude
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order, SettingChange, read_request
 from labcrane.session.live_settings import FeedbackSettings
 from labcrane.streams.recorder.candidates import answered
@@ -30,8 +36,8 @@ from labcrane.web.room.earlier import FEWEST, Earlier, read_behind
 from labcrane.web.room.sentences import KINDS, SAID, sentence
 from labcrane.web.room.shown import ShownShapes
 from labcrane.web.room.sliders import sliders
-from labcrane.web.room.snapshot import clock
-from labcrane.web.service import Opened, PageConfig
+from labcrane.web.room.snapshot import Snapshot, clock
+from labcrane.web.service import Opened, PageConfig, Streams
 from labcrane.web.state import SessionLeft, SessionView
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sphere.settings import SphereSettings
@@ -394,6 +400,7 @@ class Pages:
     def __init__(self, module: str, name: str, patience: object, take: object) -> None:
         self.exit_code, self.waiting, self.restarts = None, True, 0
         self.take = take
+        self.told: list[object] = []
 
     def start(self, order: object) -> None:
         self.order = order
@@ -403,10 +410,52 @@ class Pages:
         return True
 
     def tell(self, message: object) -> None:
-        pass
+        self.told.append(message)
 
     def stop(self) -> None:
         pass
+
+
+def test_pages_that_are_started_again_know_the_streams_after_the_recorder_has_ended(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(handle, "ProcessHandle", Pages)
+    restarted, status = threading.Event(), {"streams": [{"label": "eeg", "samples": 109_632}]}
+    said = [status]
+    pages = handle.PageHandle(
+        PageConfig, lambda _: None, lambda _: restarted.set(), lambda: said.pop() if said else {}
+    )
+    pages._process.waiting = False
+    try:
+        wait_for(lambda: Streams(status) in pages._process.told)
+        pages._process.exit_code = 1
+        assert restarted.wait(240.0)
+        pages._process.told.clear()
+        wait_for(lambda: pages._process.told)
+        assert pages._process.told[0] == Streams(status)
+    finally:
+        pages._closed.set()
+        pages.close(SessionLeft("ok", "over"))
+
+
+def test_a_page_that_knows_nothing_of_a_study_s_streams_does_not_say_that_there_are_none(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "study.yaml"
+    steps = "      - block: {task: aiming}\n"
+    asked = "streams: {eeg: {type: EEG, name: amp}}\n"
+    for more, said in (("", "The study records no streams of others."),
+                       (asked, "Nothing is known yet of the study's streams: eeg.")):  # fmt: skip
+        path.write_text(STUDY.format(study="streams", steps=steps) + more, encoding="utf-8")
+        study = load(path, discover())
+        context = SimpleNamespace(
+            study=study, plan=plan_session(study, "P001", 1), session=SessionView()
+        )
+        assert Snapshot(context, Earlier())._without_streams() == said
+    view, expected = after(*BEGUN["running"]), ExpectedSession(1 / 240, streams=["eeg"])
+    assert lamp_of(view, Punctual(), expected).reason == "nothing is known of the streams eeg"
+    view.hear_of_streams({"streams": []})
+    assert lamp_of(view, Punctual(), expected).level == "ok"
 
 
 def test_a_browser_of_pages_that_died_is_not_waited_for_at_the_end(

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from labcrane.analysis.presented import LOG, PresentedLimits
 from labcrane.web.live import Live
@@ -65,7 +64,7 @@ def state_of(view: SessionView) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ExpectedSession:
-    """What a study promises while it runs.
+    """What is to come of a study while it runs.
 
     Attributes
     ----------
@@ -75,11 +74,14 @@ class ExpectedSession:
         Names of the operator's views.
     presented
         How much they must show.
+    streams
+        The study's names for the streams of others.
     """
 
     period_s: float
     views: Sequence[str] = ()
     presented: PresentedLimits = field(default_factory=PresentedLimits)
+    streams: Sequence[str] = ()
 
 
 def lamp_of(view: SessionView, live: Live, expected: ExpectedSession, trouble: str = "") -> Lamp:
@@ -96,7 +98,7 @@ def lamp_of(view: SessionView, live: Live, expected: ExpectedSession, trouble: s
     found = [
         *_of_frames(view, live),
         *_of_pictures(view, expected),
-        *_of_streams(view.streams),
+        *_of_streams(view, expected),
         *_of_the_loop(live, expected.period_s),
     ]
     if trouble:
@@ -128,21 +130,32 @@ def _of_frames(view: SessionView, live: Live) -> Iterator[Lamp]:
         )  # fmt: skip
 
 
-def _of_pictures(view: SessionView, expected: ExpectedSession) -> Iterator[Lamp]:
-    """Yield what is wrong with the operator's views while a trial runs."""
-    if not view.trial or time.perf_counter() - view.trial_began < FIRST_S:
-        return
-    views = {LOG + name: name for name in expected.views}
+def _under_way(view: SessionView) -> bool:
+    """Whether a trial has run for so long that everything must have come."""
+    return bool(view.trial) and time.perf_counter() - view.trial_began >= FIRST_S
+
+
+def shown_badly(view: SessionView, expected: ExpectedSession) -> dict[str, str]:
+    """Return what is wrong with the operator's views while a trial runs, by their names."""
+    views = {LOG + name: name for name in expected.views} if _under_way(view) else {}
+    found = {}
     for stream in view.streams.get("streams", ()):
-        if (name := views.get(str(stream.get("source_id", "")).rpartition("/")[2])) is None:
-            continue
-        if why := expected.presented.complaint(stream["rate_hz"], stream["silent_s"]):
-            yield Lamp("bad", f"the operator's view {name} {why}", REMEDIES["picture"])
+        if name := views.get(str(stream.get("source_id", "")).rpartition("/")[2]):
+            found[name] = expected.presented.complaint(stream["rate_hz"], stream["silent_s"])
+    return {name: why for name, why in found.items() if why}
 
 
-def _of_streams(status: Mapping[str, Any]) -> list[Lamp]:
+def _of_pictures(view: SessionView, expected: ExpectedSession) -> Iterator[Lamp]:
+    for name, why in shown_badly(view, expected).items():
+        yield Lamp("bad", f"the operator's view {name} {why}", REMEDIES["picture"])
+
+
+def _of_streams(view: SessionView, expected: ExpectedSession) -> list[Lamp]:
     found = []
-    for stream in status.get("streams", ()):
+    if not view.streams and expected.streams and _under_way(view):
+        unknown = f"nothing is known of the streams {', '.join(expected.streams)}"
+        found.append(Lamp("bad", unknown, REMEDIES["stream"]))
+    for stream in view.streams.get("streams", ()):
         label, condition = stream["label"], stream["condition"]
         if stream.get("required") and condition in {"absent", "silent"}:
             found.append(Lamp("bad", f"stream {label} is {condition}", REMEDIES["stream"]))

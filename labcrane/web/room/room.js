@@ -149,7 +149,7 @@ export default {
           <span><strong>{{ one.label }}</strong> {{ one.words }}</span></div>
       </section>
       <section class="room-card" id="streams"><h2>Streams of others</h2>
-        <p v-if="!s.streams.length" class="room-faint">The study records no streams of others.</p>
+        <p v-if="!s.streams.length" class="room-faint">{{ s.noStreams }}</p>
         <div v-for="one in s.streams" :key="one.label" class="room-stream" :class="one.level">
           <svg viewBox="0 0 90 24" role="img" :aria-label="'rate of ' + one.label">
             <path :d="trace(one.trace)"/></svg>

@@ -14,7 +14,7 @@ from labcrane.protocol.study import Study
 from labcrane.web.page import PageContext
 from labcrane.web.room.bars import groups
 from labcrane.web.room.buttons import answers, buttons
-from labcrane.web.room.condition import ExpectedSession, lamp_of, state_of
+from labcrane.web.room.condition import ExpectedSession, lamp_of, shown_badly, state_of
 from labcrane.web.room.earlier import Earlier
 from labcrane.web.room.sentences import KINDS, sentence
 from labcrane.web.room.sliders import sliders
@@ -57,7 +57,10 @@ class Snapshot:
         }
         self._period_s = 1.0 / study.protocol.rate_hz
         self._expected = ExpectedSession(
-            self._period_s, operators_views(views), study.protocol.presented
+            self._period_s,
+            operators_views(views),
+            study.protocol.presented,
+            list(study.protocol.streams),
         )
 
     def parts(self) -> dict[str, Any]:
@@ -110,7 +113,8 @@ class Snapshot:
             "lateText": self._lateness(),
             "tickMs": 1000 * self._period_s,
             "streams": [one for name, one in streams if not name.startswith(LOG)],
-            "presented": [one for name, one in streams if name.startswith(LOG)],
+            "noStreams": self._without_streams(),
+            "presented": self._presented(streams),
             "settings": self._settings(),
             "kinds": list(KINDS),
             "events": self._events(),
@@ -202,6 +206,24 @@ class Snapshot:
             )
             for stream in session.streams.get("streams", ())
         ]
+
+    def _presented(self, streams: list[tuple[str, dict[str, Any]]]) -> list[dict[str, Any]]:
+        """Return the streams of views and sounds; a view that shows too little says so."""
+        wrong = shown_badly(self._context.session, self._expected)
+        return [
+            {**one, "level": "bad", "words": f"{one['words']}: {wrong[one['label']]}"}
+            if one["label"] in wrong
+            else one
+            for name, one in streams
+            if name.startswith(LOG)
+        ]
+
+    def _without_streams(self) -> str:
+        """Return what stands where no stream of others is listed."""
+        asked = ", ".join(self._expected.streams)
+        if asked:
+            return f"Nothing is known yet of the study's streams: {asked}."
+        return "The study records no streams of others."
 
     def _settings(self) -> list[dict[str, Any]]:
         study, changed = self._context.study, self._context.session.settings
