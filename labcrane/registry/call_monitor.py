@@ -32,10 +32,33 @@ T = TypeVar("T")
 
 @dataclass(slots=True)
 class Overrun:
-    """Calls of one method that took longer than a tick may."""
+    """Calls of one method that took longer than a tick may.
+
+    Attributes
+    ----------
+    calls
+        How many.
+    waited
+        How many of them computed for less than a tick: they waited for a device, or did not have
+        the processor, which another program had.
+    worst_s
+        How long the longest took, in seconds.
+    computed_s
+        How long the thread had the processor from the tick's beginning to the end of that call, in
+        seconds: at most so much of it did the call compute.
+    """
 
     calls: int = 0
+    waited: int = 0
     worst_s: float = 0.0
+    computed_s: float = 0.0
+
+    def add(self, took_s: float, computed_s: float, patience_s: float) -> None:
+        """Count a call."""
+        self.calls += 1
+        self.waited += computed_s < patience_s
+        if took_s > self.worst_s:
+            self.worst_s, self.computed_s = took_s, computed_s
 
 
 class CallMonitor:
@@ -56,6 +79,7 @@ class CallMonitor:
         self._number = memoryview(bytearray(8)).cast("q")
         self._base = 0
         self._inside = 0
+        self._computed_s = 0.0
 
     @property
     def tick(self) -> int:
@@ -65,6 +89,9 @@ class CallMonitor:
     def begin_tick(self, number: int) -> None:
         """Take note of the tick that begins."""
         self._base = (number + 1) << SHIFT
+        if self.patience_s < math.inf:
+            # Once a tick and not at each call: it asks the kernel, for up to microseconds.
+            self._computed_s = time.thread_time()
 
     @cached_property
     def _arrays(self) -> tuple[type[np.ndarray[Any, Any]], np.dtype[np.float64]]:
@@ -114,8 +141,7 @@ class CallMonitor:
         took = time.perf_counter() - began
         if took > self.patience_s:
             overrun = self.overruns.setdefault(self._places[number - 1], Overrun())
-            overrun.calls += 1
-            overrun.worst_s = max(overrun.worst_s, took)
+            overrun.add(took, time.thread_time() - self._computed_s, self.patience_s)
         return result
 
     def watched(

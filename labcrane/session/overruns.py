@@ -1,8 +1,11 @@
-"""Overruns: components that take longer than a tick has, and are told of."""
+"""Overruns: components that take longer than a tick has, and are told of.
+
+Whether one computed for so long, or waited while another program had the processor, is told apart.
+"""
 
 from labcrane.core.records import Event, Frame
 from labcrane.recording.frame_log import FrameLog
-from labcrane.registry.call_monitor import CallMonitor
+from labcrane.registry.call_monitor import CallMonitor, Overrun
 from labcrane.session.commands import Console
 
 FEW = 3
@@ -38,13 +41,24 @@ class OverrunReporter:
                 "plugin.slow",
                 frame.tick.due,
                 {
-                    "why": f"{place}, took up to {1000 * overrun.worst_s:.0f} ms, and a tick has "
-                    f"{1000 * self._period:.1f} ms",
+                    "why": self._why(str(place), overrun),
                     "calls": overrun.calls,
+                    "waited": overrun.waited,
                     "worst_s": overrun.worst_s,
+                    "computed_s": overrun.computed_s,
                     "tick_s": self._period,
                 },
             )
             self._log.append(event, frame.tick.number)
             self._console.report(event)
         self._call_monitor.overruns.clear()
+
+    def _why(self, place: str, overrun: Overrun) -> str:
+        took, tick = 1000 * overrun.worst_s, 1000 * self._period
+        said = f"{place}, took up to {took:.0f} ms, and a tick has {tick:.1f} ms"
+        if overrun.computed_s >= self._period:
+            return said
+        return (
+            f"{said}; it computed for {1000 * overrun.computed_s:.1f} ms at most, and waited for a "
+            "device, or for the processor that other programs had"
+        )

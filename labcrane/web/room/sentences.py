@@ -78,7 +78,7 @@ SAID: Mapping[str, tuple[str, str, str]] = {
     "trigger.lost": ("trigger {why}", "faults", "bad"),
     "trigger.flood": ("trigger {why}", "faults", "bad"),
     "trigger.back": ("trigger {trigger} is back", "faults", ""),
-    "plugin.slow": ("too slow: {why}", "faults", "warn"),
+    "plugin.slow": ("slow call: {why}", "faults", "warn"),
     "page.denied": ("refused: {why}", "faults", "warn"),
     "launcher.gone": ("the launcher is gone: the session ends", "faults", "bad"),
     "participant.dropout": ("the participant stops: {why}", "other", "warn"),
