@@ -18,6 +18,9 @@ HEADING = "role=heading aria-level=2"
 MOST_TICKS = 21
 """A scale with more steps is a field to write into."""
 
+FEW_TICKS = 11
+"""A scale with more of them has no room for its numbers on a narrow screen."""
+
 
 class Form:
     """Shows the questionnaire that is asked, and what the record has of its answers.
@@ -165,7 +168,9 @@ class Form:
             with ui.element("div").classes("form-ends"):
                 ui.label(item.left)
                 ui.label(item.right)
-        with ui.element("div").classes("form-choices"):
+        fine = " form-fine" if len(values) > FEW_TICKS else ""
+        scale = f"form-scale{fine}" if item.kind == "scale" else "form-choices"
+        with ui.element("div").classes(scale):
             for value, label in values.items():
                 button = ui.button(
                     label, on_click=lambda value=value: self._answer(name, item, value)

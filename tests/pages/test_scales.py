@@ -1,0 +1,100 @@
+"""Scales of questionnaires as they stand on the page: measured by their boxes in Chromium."""
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from faults.sessions import wait_for
+from pages.room import text
+from pages.test_states import Told, opened, pages
+from PIL import Image
+from selenium import webdriver
+from selenium.webdriver.common.by import By
+
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+
+pytestmark = pytest.mark.slow
+
+WIDTHS = (360, 768, 1280, 1920)
+SHORT = """\
+  short: {use: subjective_accuracy}
+"""
+BOXES = """
+return [...document.querySelectorAll('.form-item')].map(card => {
+    const box = e => {
+        const b = e.getBoundingClientRect();
+        return [b.left, b.top, b.right, b.bottom];
+    };
+    return {
+        card: box(card), ends: [...card.querySelectorAll('.form-ends > *')].map(box),
+        ticks: [...card.querySelectorAll('.form-scale button')].map(box),
+        cut: [...card.querySelectorAll('.form-scale button')].filter(
+            e => e.scrollWidth > e.clientWidth + 1).map(e => e.innerText),
+    };
+});
+"""
+
+
+def sized(browser: webdriver.Chrome, width: int) -> None:
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+
+def asked(told: Told, browser: webdriver.Chrome, name: str) -> None:
+    opened(browser, told.links["participant"])
+    told.happens(
+        ("consent.given", {"version": "a", "by": "participant"}),
+        ("questionnaire.start", {"questionnaire": name, "title": name, "kept": json.dumps({})}),
+    )
+    wait_for(lambda: text(browser, "answered"))
+
+
+@pytest.mark.parametrize("name", ["load", "short"])
+def test_a_scale_is_one_row_with_its_anchors_over_its_ends(
+    name: str, tmp_path: Path, browser: webdriver.Chrome
+) -> None:
+    with pages(tmp_path, SHORT) as told:
+        items = load(told.order.protocol, discover()).questionnaires[name].items()
+        asked(told, browser, name)
+        for width in WIDTHS:
+            sized(browser, width)
+            scales = browser.execute_script(BOXES)
+            assert len(scales) == len(items)
+            for item, scale in zip(items, scales, strict=True):
+                ticks, card = np.array(scale["ticks"]), scale["card"]
+                assert len(ticks) == round((item.highest - item.lowest) / item.step) + 1
+                assert np.ptp(ticks[:, 1]) < 1.0, f"{item.name} breaks at {width} px"
+                assert (np.diff(ticks[:, 0]) > 0.0).all()
+                assert np.ptp(ticks[:, 2] - ticks[:, 0]) < 1.0, "steps are equally wide"
+                assert card[0] < ticks[0, 0] < ticks[-1, 2] < card[2] <= width
+                low, high = scale["ends"]
+                assert low[0] == pytest.approx(ticks[0, 0], abs=1.0)
+                assert high[2] == pytest.approx(ticks[-1, 2], abs=1.0)
+                assert low[3] <= ticks[0, 1]
+                assert scale["cut"] == [], f"{item.name} at {width} px"
+        names = [
+            each.accessible_name
+            for each in browser.find_elements(By.CSS_SELECTOR, ".form-scale button")
+        ]
+        ticks = np.arange(items[0].lowest, items[0].highest + 1e-9, items[0].step)
+        assert names[: len(ticks)] == [f"{tick:g}" for tick in ticks]
+
+
+def test_the_bar_of_answers_is_as_full_as_there_are_answers(
+    tmp_path: Path, browser: webdriver.Chrome
+) -> None:
+    with pages(tmp_path) as told:
+        asked(told, browser, "load")
+        sized(browser, 1280)
+        items = load(told.order.protocol, discover()).questionnaires["load"].items()
+        for done, item in enumerate(("", *(each.name for each in items))):
+            if item:
+                told.happens(("questionnaire.answer", {"item": item, "value": 50.0}))
+            wait_for(lambda done=done: text(browser, "answered").startswith(f"{done} of "))
+            bar = browser.find_element(By.TAG_NAME, "progress")
+            picture = np.asarray(Image.open(io.BytesIO(bar.screenshot_as_png)).convert("L"), float)
+            middle = picture[len(picture) // 2, 2:-2]
+            assert (middle < 160.0).mean() == pytest.approx(done / len(items), abs=0.02)
