@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from labcrane.core.findings import Finding, Verdict
-from labcrane.doctor import apart, clock, components, disk, scheduling
+from labcrane.doctor import apart, clock, components, disk, scheduling, screen
 from labcrane.doctor.report import Check, Diagnosis, as_data, diagnosis, keep, latest
 from labcrane.doctor.versions import versions
 from labcrane.protocol.study import Study
@@ -49,6 +49,7 @@ def examine(
     for area, call in (
         ("clock", apart.Call("the clock", OTHERWISE, clock.examine)),
         ("scheduling", apart.Call("scheduling", OTHERWISE, scheduling.examine, (rate_hz,))),
+        ("screen", apart.Call("the screen", OTHERWISE, screen.examine)),
         ("disk", apart.Call(f"folder {data}", UNMOUNTED, disk.examine, (data, needed_bytes))),
     ):
         yield from _checks(area, apart.examine(call))

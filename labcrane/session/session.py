@@ -19,6 +19,7 @@ from labcrane.doctor.scheduling import lateness
 from labcrane.errors import DeviceError, PluginError, ProtocolError
 from labcrane.files.lock import held
 from labcrane.processes.real_time import real_time
+from labcrane.processes.wake_lock import wake_lock
 from labcrane.protocol.rig import Rig
 from labcrane.recording.crash_marker import CrashMarker, clear, read_crash_marker
 from labcrane.recording.frame_log import BatchLog, FrameLog, columns, frame_bytes
@@ -195,6 +196,7 @@ def _record(
     died = read_crash_marker(visit.crash_marker) if visit.resumed else None
     with (
         _scheduled(visit) as scheduling,
+        _awake(visit) as awake,
         _watching(visit, rig),
         rig.opened(study, plan.seed) as run,
     ):
@@ -202,7 +204,7 @@ def _record(
             rig.dynamics.reset(within_limits(study, so_far.angles))
         second = frame_bytes(run) * run.rate_hz
         visit.folder.check_space(plan.expected_s, second, RESERVE_S)
-        about = context(visit, plan, rig, run) | admission.context | scheduling
+        about = context(visit, plan, rig, run) | admission.context | scheduling | awake
         if study.protocol.design.tracks:
             about["carried"] = [asdict(each) for each in carried]
         awaits = (*study.views, *study.sounds) if visit.feedback else ()
@@ -272,6 +274,16 @@ def _scheduled(visit: Visit) -> Iterator[dict[str, Any]]:
         with_it = _late(SystemClock(SystemClock.REAL_TIME_SPIN_S), rate_hz)
         lateness = {"before": before, "with": with_it}
         yield {"real_time": {**asdict(granted), "lateness_ms": lateness}}
+
+
+@contextmanager
+def _awake(visit: Visit) -> Iterator[dict[str, Any]]:
+    """Keep the screen awake while people are recorded; give what the record is to say of it."""
+    if visit.simulated:
+        yield {}
+        return
+    with wake_lock() as lock:
+        yield {"wake_lock": asdict(lock)}
 
 
 def _late(clock: Clock, rate_hz: float) -> dict[str, float]:

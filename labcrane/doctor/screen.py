@@ -1,0 +1,20 @@
+"""Screen examination: whether a session can keep it from going blank."""
+
+from collections.abc import Iterator
+
+from labcrane.core.findings import Finding, Verdict
+from labcrane.processes.wake_lock import wake_lock
+
+ADVICE = "switch off blanking, locking and sleep in the desktop's settings for study days"
+
+
+def examine() -> Iterator[Finding]:
+    """Ask for the screen to stay awake as a session does, and say who keeps it so."""
+    with wake_lock() as lock:
+        if lock.held_by:
+            text = f"a session keeps the screen awake by {', '.join(lock.held_by)}"
+            yield Finding(Verdict.PASS, text)
+            return
+    why = "; ".join(lock.failed) or "no program that could is installed"
+    text = f"the screen may go blank or lock itself in a session: nothing keeps it awake ({why})"
+    yield Finding(Verdict.WARN, text, ADVICE)
