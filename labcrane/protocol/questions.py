@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from labcrane.analysis.indicator_settings import COUNTS, RATINGS, TIME
+from labcrane.analysis.presented import operators_views
 from labcrane.core.references import Reference, mentioned
 from labcrane.errors import LabcraneError, ProtocolError, suggestion
 from labcrane.files.pseudonyms import pseudonyms
@@ -164,6 +165,7 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_the_loop(study)
     yield from _of_feedback(study)
     yield from _of_what_nobody_sees(study)
+    yield from _of_slow_views(study)
     yield from _of_what_is_shared(study)
     yield from _of_buttons(study)
     yield from _of_monitors(study)
@@ -361,6 +363,20 @@ def _of_what_nobody_sees(study: Study) -> Doubts:
                     "the operator has no view, so that nobody sees them; add one, as views: "
                     "{operator: {use: view}}",
                 )
+
+
+def _of_slow_views(study: Study) -> Doubts:
+    """Question views that are to show fewer pictures than a movement needs to count."""
+    least, folder = study.protocol.presented.min_hz, study.path.parent
+    views = {f"views.{name}": choice.described(folder) for name, choice in study.views.items()}
+    for name in operators_views(views):
+        rate = views[f"views.{name}"]["settings"].get("rate_hz")
+        if rate is not None and rate < least:
+            yield (
+                ("views", name, "rate_hz"),
+                f"view {name!r} shows {rate:g} pictures a second, and presented asks for "
+                f"{least:g}, so that no movement counts; write presented: {{min_hz: {rate / 2:g}}}",
+            )
 
 
 def _audiences(study: Study) -> Iterator[Sequence[str]]:

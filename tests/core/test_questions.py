@@ -74,6 +74,8 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
         ([("sessions:", BALL), (BLOCK, BLOCK.replace("pairs", "feedback: [ball], pairs"))],
          "feedback.tone", "never switched on"),
         ([("sessions:", GROUPS)], "design.groups", "no block has feedback: group"),
+        ([("sessions:", "views: {v: {use: view, rate_hz: 10}}\nsessions:")], "views.v.rate_hz",
+         "shows 10 pictures a second, and presented asks for 15, so that no movement counts"),
         ([("sessions:", BALL)], "feedback.ball", "the operator has none, so that nobody sees it"),
         ([("sessions:", f"views: {{desk: {{use: view, seen_by: examiner, hud: []}}}}\n{BALL}")], "feedback.ball",
          "add one, as views: {operator: {use: view}}"),

@@ -198,8 +198,7 @@ def test_what_was_not_shown_is_no_success_and_no_time_out_and_is_told_in_the_ans
     table.loc[table["participant"] == "P004", "presentation_failed"] = 0.0
     assert time_outs(table, ["distance"])["trials"].sum() == len(table) - 2
     assert _exclusions(table).endswith(
-        "2 of 1 participant because the operator was shown too little of them: "
-        "P003 trial 1, P003 trial 2."
+        "The operator was shown too little of 2, from 1 participant: P003 trial 1, P003 trial 2."
     )
 
 

@@ -239,8 +239,9 @@ def _exclusions(everything: "pd.DataFrame") -> str:
     if len(unseen):
         people = unseen["participant"].nunique()
         who = f"{people} {'participant' if people == 1 else 'participants'}"
-        said += f" {len(unseen)} of {who} because the operator was shown too little of them: "
-        said += f"{listed(unseen)}."
+        said += (
+            f" The operator was shown too little of {len(unseen)}, from {who}: {listed(unseen)}."
+        )
     still = everything[without_onset(everything)]
     return f"{said} Without an onset: {listed(still)}." if len(still) else said
 
