@@ -17,6 +17,7 @@ from labcrane.analysis.report import figures, report
 from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.report.html import Page
 from labcrane.analysis.report.outcomes import gaze_tests, measures_in
+from labcrane.analysis.report.panels import Panel, Series, svg_of
 from labcrane.analysis.report.report import write_report
 from labcrane.analysis.report.sample import in_words, sample
 from labcrane.analysis.report.words import STYLES, Results, paragraphs
@@ -49,6 +50,25 @@ def test_each_figure_is_svg_and_of_the_study_png_and_pdf_and_its_table_csv(folde
             assert (folder / f"{figure}.pdf").read_bytes().startswith(b"%PDF")
         ET.parse(folder / f"{figure}.svg")
         assert len(pd.read_csv(folder / f"{figure.replace('figures', 'tables')}.csv"))
+
+
+@pytest.mark.slow
+def test_below_each_figure_stands_that_it_is_of_no_people(folder: Path, cohort: Cohort) -> None:
+    said = {name: (folder / name).read_text(encoding="utf-8")
+            for name in under(folder) if name.endswith(".svg")}  # fmt: skip
+    made = {name for name, text in said.items()
+            if "<!-- SIMULATED -->" in text or ">SIMULATED</text>" in text}  # fmt: skip
+    assert made == {name for name in said if "/P0" not in name or "SIMULATED" in name}
+    assert 0 < len(made) < len(said)
+
+
+def test_a_footer_is_below_the_panels_and_makes_the_figure_higher(tmp_path: Path) -> None:
+    panels = [Panel("x", "y", [Series(np.arange(3.0), np.arange(3.0))])]
+    plain, told = (ET.fromstring(svg_of(panels, footer)) for footer in ("", "PILOT <1>"))
+    heights = [float(root.get("height").removesuffix("pt")) for root in (plain, told)]
+    assert heights[1] > heights[0]
+    (footer,) = [each for each in told.iter() if each.text == "PILOT <1>"]
+    assert heights[0] < float(footer.get("y")) < heights[1]
 
 
 @pytest.mark.slow

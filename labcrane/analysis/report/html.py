@@ -33,10 +33,15 @@ class Page:
         Folder of the report.
     prefix
         Put before the names of pictures and tables: the participant, on their page.
+    footer
+        Below every figure, which others take out of the page: ``SIMULATED``.
     """
 
-    def __init__(self, title: str, path: Path, root: Path, prefix: str = "") -> None:
+    def __init__(
+        self, title: str, path: Path, root: Path, prefix: str = "", footer: str = ""
+    ) -> None:
         self._path, self._root, self._prefix = path, root, prefix
+        self._footer = footer
         self._up = "../" * len(path.relative_to(root).parent.parts)
         self._title = title
         self._lead: Mapping[str, Sequence[str]] = {}
@@ -80,13 +85,13 @@ class Page:
     def draw(self, drawing: Drawing) -> None:
         """Add a figure by Matplotlib, as SVG, PNG and PDF, and its table as CSV."""
         figure = drawing.figure
-        save(figure, self._figure(drawing))
+        save(figure, self._figure(drawing), self._footer)
         self._show(drawing, ("svg", "png", "pdf"), _size(figure))
 
     def sketch(self, drawing: Drawing) -> None:
         """Add a figure as plain SVG, and write its table as CSV; a hundred times as fast."""
         self._figure(drawing).with_suffix(".svg").write_text(
-            svg_of(drawing.panels), encoding="utf-8"
+            svg_of(drawing.panels, self._footer), encoding="utf-8"
         )
         self._show(drawing, ("svg",))
 

@@ -30,6 +30,9 @@ DOTS_PER_INCH = 72
 LEFT, RIGHT, TOP, BOTTOM = 58.0, 12.0, 24.0, 44.0
 """What is left free around a panel's axes in SVG, in points."""
 
+FOOTER = 16.0
+"""Of the line below all panels, in points."""
+
 MOST_TICKS = 6
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 
@@ -121,13 +124,19 @@ def figure_of(panels: Sequence[Panel]) -> "Figure":
     return figure
 
 
-def svg_of(panels: Sequence[Panel]) -> str:
-    """Return panels as the text of an SVG file."""
+def svg_of(panels: Sequence[Panel], footer: str = "") -> str:
+    """Return panels as the text of an SVG file; ``footer`` is below them."""
     width, height = WIDTH * DOTS_PER_INCH, HEIGHT * DOTS_PER_INCH
     parts = [
         f'<g transform="translate({number * width:g} 0)">{"".join(_axes(panel, width, height))}</g>'
         for number, panel in enumerate(panels)
     ]
+    if footer:
+        parts.append(
+            f'<text x="{len(panels) * width / 2:g}" y="{height + FOOTER - 4:g}" fill="black" '
+            f'font-weight="bold" text-anchor="middle">{html.escape(footer)}</text>'
+        )
+        height += FOOTER
     size = f"{len(panels) * width:g}", f"{height:g}"
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{size[0]}pt" height="{size[1]}pt" '

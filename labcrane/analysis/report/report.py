@@ -100,7 +100,8 @@ def write_report(
     columns = zip(*in_order, strict=True)
     movements, loops, syncs, answers, scores, thresholds, drifts, without = columns
     everything = with_unseen_areas(pd.concat(movements, ignore_index=True))
-    page = Page(_title(cohort.included), folder / "report.html", folder)
+    kinds = _kinds(cohort.included)
+    page = Page(_title(cohort.included), folder / "report.html", folder, footer=kinds)
     _stamp(page, [participant.status for participant in cohort.included])
     page.links({p.name: f"participants/{p.name}.html" for p in cohort.included})
     _who(page, cohort, everything)
@@ -185,9 +186,15 @@ def _primary(cohort: Cohort) -> list[str]:
 def _title(participants: Sequence[Participant]) -> str:
     """Return the study's title, behind what kind of participants it is about."""
     title = str(participants[0].context.get("title", "labcrane"))
+    kinds = _kinds(participants)
+    return f"{kinds}: {title}" if kinds else title
+
+
+def _kinds(participants: Sequence[Participant]) -> str:
+    """Return ``SIMULATED and PILOT``, as far as there are any; nothing where all are people's."""
     found = {participant.status for participant in participants}
-    kinds = [str(kind).upper() for kind in (Status.SIMULATED, Status.PILOT) if kind in found]
-    return f"{' and '.join(kinds)}: {title}" if kinds else title
+    named = [str(kind).upper() for kind in (Status.SIMULATED, Status.PILOT) if kind in found]
+    return " and ".join(named)
 
 
 def _stamp(page: Page, statuses: list[Status]) -> None:
@@ -535,7 +542,9 @@ def _participant_page(
     folder: Path,
 ) -> None:
     path = folder / "participants" / f"{participant.name}.html"
-    page = Page(participant.name, path, folder, prefix=f"{participant.name}_")
+    page = Page(
+        participant.name, path, folder, prefix=f"{participant.name}_", footer=_kinds([participant])
+    )
     page.links({"study": "../report.html"})
     _stamp(page, [participant.status])
     page.say(participant.why)

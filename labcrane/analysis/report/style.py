@@ -68,9 +68,11 @@ def new_figure(columns: int = 1, high: float = HIGH) -> "Figure":
     return figure
 
 
-def save(figure: "Figure", path: Path) -> None:
-    """Write a figure as SVG, PNG and PDF, by a path without an ending."""
+def save(figure: "Figure", path: Path, footer: str = "") -> None:
+    """Write a figure as SVG, PNG and PDF, by a path without an ending; ``footer`` is below it."""
     with styled():
+        if footer:
+            figure.supxlabel(footer, fontsize=7.0, fontweight="bold")
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # found once, not for every format
         figure.savefig(path.with_name(f"{path.name}.svg"), metadata={"Date": None})
