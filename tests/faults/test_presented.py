@@ -26,6 +26,7 @@ from labcrane.launcher.launcher import Launcher
 from labcrane.launcher.pages import left_behind
 from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.visit import Visit, visit_of
+from labcrane.streams.recorder.process import STATUS_S
 from labcrane.web.room.condition import ExpectedSession, Lamp, lamp_of
 from labcrane.web.state import SessionView
 from labcrane_tables.settings import TableSettings
@@ -110,6 +111,7 @@ class Examiner(QueueConsole):
         finally:
             over = time.perf_counter()
             view.send_signal(signal.SIGCONT)
+        wait_for(lambda: self.passed(over + STATUS_S))  # the recorder's last word of it
         return began, over
 
     def kill_a_view(self) -> None:
