@@ -85,7 +85,8 @@ def test_show_tells_settings_with_units_and_defaults_signals_and_an_example(
     assert far["default"] == "4.0"
     assert far["possible"] == "number above 0"
     assert "in metres" in far["meaning"]
-    assert {"column": "radius", "unit": "m", "where": "every frame presented"} in sheet["recorded"]
+    recorded = {each["column"]: (each["unit"], each["where"]) for each in sheet["recorded"]}
+    assert recorded["radius"] == ("m", "every frame presented")
     assert main(["plugins", "show", "sphere"]) == 0
     said = capsys.readouterr().out
     for word in ("smallest", "target, tip", "0.15", "every frame presented", "use: sphere"):
