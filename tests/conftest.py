@@ -22,7 +22,7 @@ from needs import need, not_tried
 from once import RUN_FOLDER
 from parts import Parts, add_options, asked_for
 from port_block import claim
-from second_try import GATE, SecondTry
+from second_try import GATE, QUICK, SecondTry
 
 from labcrane.streams.network import LOOPBACK
 
@@ -78,10 +78,6 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Parts(config))
     if GATE in os.environ and not hasattr(config, "workerinput"):
         config.pluginmanager.register(SecondTry(config, Path(os.environ.pop(GATE))))
-
-
-QUICK = "not slow and not long and not soak"
-"""What ``pytest`` runs without a word; pyproject.toml says so too."""
 
 
 @pytest.hookimpl(optionalhook=True)  # pytest -p no:xdist

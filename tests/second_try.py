@@ -16,11 +16,17 @@ import pytest
 GATE = "LABCRANE_GATE"
 """Names the file that the stages of a gate write their runs into; set by the gate alone."""
 
+QUICK = "not slow and not long and not soak"
+"""What ``pytest`` runs without a word; pyproject.toml says so too."""
+
 MOST = 3
 """How many tests of one gate may need a second try."""
 
 LONG_FOR_QUICK_S = 3.0
 """Quick tests that take longer are listed; they fail nothing."""
+
+QUICK_PROCESSOR_S = 420.0
+"""What the quick tests may have of a processor before a run of them says so; it fails nothing."""
 
 LASTS_S = 1200.0
 """How long the second tries may take together."""
@@ -103,7 +109,10 @@ class SecondTry:
         }
         for name, seconds in sorted(long.items(), key=lambda pair: -pair[1]):
             terminalreporter.line(f"{seconds:6.1f} s for a quick test: {name}")
-        terminalreporter.line(f"{_processor_s():.0f} s of processor")
+        used = _processor_s()
+        most = QUICK_PROCESSOR_S if terminalreporter.config.getoption("markexpr") == QUICK else used
+        more = f": more than the {most:.0f} s of quick tests" if used > most else ""
+        terminalreporter.line(f"{used:.0f} s of processor{more}")
         for says in self._says:
             terminalreporter.line(says)
 

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from second_try import QUICK
 
 TESTS = """
 from pathlib import Path
@@ -22,7 +23,10 @@ def test_it(number):
 CONFTEST = """
 import os
 from pathlib import Path
+import second_try
 from second_try import GATE, SecondTry
+
+second_try.QUICK_PROCESSOR_S = 0.0
 
 def pytest_configure(config):
     if GATE in os.environ and not hasattr(config, "workerinput"):
@@ -31,7 +35,11 @@ def pytest_configure(config):
 
 
 def gate_in(
-    folder: Path, *, once: tuple[int, ...] = (), always: tuple[int, ...] = (), processes: str = "0"
+    folder: Path,
+    *words: str,
+    once: tuple[int, ...] = (),
+    always: tuple[int, ...] = (),
+    processes: str = "0",
 ) -> tuple[int, str, dict]:
     """Return the status, what was said, and what is noted of the newest run."""
     tests = TESTS.replace("__ALWAYS__", str(always)).replace("__ONCE__", str(once))
@@ -40,7 +48,7 @@ def gate_in(
     (folder / "pytest.ini").write_text("[pytest]\n")
     here = {"PYTHONPATH": str(Path(__file__).parent), "PATH": "", "LABCRANE_GATE": "runs"}
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-n", processes],
+        [sys.executable, "-m", "pytest", "-q", "-n", processes, *words],
         cwd=folder, env=here, capture_output=True, text=True, check=False,
     )  # fmt: skip
     newest = (folder / "runs").read_text().splitlines()[-1]
@@ -80,3 +88,13 @@ def test_a_run_in_which_nothing_fails_needs_none(tmp_path: Path) -> None:
     assert (status, noted["passed"], noted["second_try"]) == (0, 6, [])
     assert "second try" not in said
     assert "s of processor" in said
+
+
+@pytest.mark.slow
+def test_quick_tests_that_take_too_much_of_a_processor_are_named_and_fail_nothing(
+    tmp_path: Path,
+) -> None:
+    status, said, _ = gate_in(tmp_path, "-m", QUICK)
+    assert status == 0
+    assert "s of processor: more than the 0 s of quick tests" in said
+    assert "of quick tests" not in gate_in(tmp_path)[1]
