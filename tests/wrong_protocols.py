@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, SequenceNode
 
-from labcrane.analysis.indicator_settings import IndicatorSettings
+from labcrane.analysis.scoring.settings import IndicatorSettings
 from labcrane.protocol.pages import PageSettings
 from labcrane.protocol.protocol import OnFault, Participants
 from labcrane.protocol.streams import StreamNeed, TimeLimits

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labcrane.analysis.indicator import SUBJECTIVE
-from labcrane.analysis.operator_tests import OperatorTest
+from labcrane.analysis.scoring.indicator import SUBJECTIVE
+from labcrane.analysis.scoring.operator_tests import OperatorTest
 
 WORDS = {
     "duration": "time: work faster",

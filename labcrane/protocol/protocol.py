@@ -19,8 +19,8 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from labcrane.analysis.indicator_settings import IndicatorSettings
 from labcrane.analysis.presented import PresentedLimits
+from labcrane.analysis.scoring.settings import IndicatorSettings
 from labcrane.files.model import AtMost, was_run
 from labcrane.files.names import misfit
 from labcrane.files.yaml import YamlFile

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from labcrane.analysis.indicator_settings import COUNTS, RATINGS, TIME
 from labcrane.analysis.presented import operators_views
+from labcrane.analysis.scoring.settings import COUNTS, RATINGS, TIME
 from labcrane.core.references import Reference, mentioned
 from labcrane.errors import LabcraneError, ProtocolError, suggestion
 from labcrane.files.pseudonyms import pseudonyms

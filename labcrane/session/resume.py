@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from labcrane.analysis.indicator_settings import COUNTS, TIME
+from labcrane.analysis.scoring.settings import COUNTS, TIME
 from labcrane.core.records import UNDONE, Phase, Trial, Value, is_counted
 from labcrane.design.counts import TableNumbers, TrialCounts, numbers, spans
 from labcrane.design.plan import (

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Mapping
 
-from labcrane.analysis.indicator import Performance, indicate
-from labcrane.analysis.indicator_settings import COUNTS, RATINGS, TIME, IndicatorSettings
-from labcrane.analysis.operator_tests import DROPS, completion
+from labcrane.analysis.scoring.indicator import Performance, indicate
+from labcrane.analysis.scoring.operator_tests import DROPS, completion
+from labcrane.analysis.scoring.settings import COUNTS, RATINGS, TIME, IndicatorSettings
 from labcrane.core.records import Event, Value
 
 SHARE = "score.share"

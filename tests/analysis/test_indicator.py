@@ -15,10 +15,15 @@ from needs import need
 
 from labcrane.analysis.advice import familiarity, fatigue, suggest
 from labcrane.analysis.cohort import find_cohort
-from labcrane.analysis.indicator import Indicator, Performance, indicate
-from labcrane.analysis.indicator_settings import IndicatorSettings, Weights
-from labcrane.analysis.operator_tests import Detection, OperatorTest, completion, operator_tests
 from labcrane.analysis.report.workbook import advice, write_workbook
+from labcrane.analysis.scoring.indicator import Indicator, Performance, indicate
+from labcrane.analysis.scoring.operator_tests import (
+    Detection,
+    OperatorTest,
+    completion,
+    operator_tests,
+)
+from labcrane.analysis.scoring.settings import IndicatorSettings, Weights
 from labcrane.cli.app import main
 from labcrane.core.records import Event
 from labcrane.errors import LabcraneError, RecordingError

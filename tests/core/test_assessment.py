@@ -4,8 +4,8 @@ import random
 
 import pytest
 
-from labcrane.analysis.indicator import Performance, indicate
-from labcrane.analysis.indicator_settings import COUNTS, IndicatorSettings
+from labcrane.analysis.scoring.indicator import Performance, indicate
+from labcrane.analysis.scoring.settings import COUNTS, IndicatorSettings
 from labcrane.core.records import Event
 from labcrane.session.commands import Order
 from labcrane.web.assessment import LIVE, Assessment

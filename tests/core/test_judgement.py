@@ -12,7 +12,7 @@ from simple_crane import CRANE
 
 from labcrane import ProtocolError, open_recording
 from labcrane.analysis.cohort import find_cohort
-from labcrane.analysis.operator_tests import OperatorTest, operator_tests
+from labcrane.analysis.scoring.operator_tests import OperatorTest, operator_tests
 from labcrane.cli.terminal import _event_line
 from labcrane.core.clock import Tick
 from labcrane.core.records import Event, SessionState

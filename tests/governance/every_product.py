@@ -18,10 +18,10 @@ from governed import GOVERNED, TODAY, Lab
 from needs import GRAPHICS, missing
 from pyarrow import parquet
 
-from labcrane.analysis.indicator import Performance, indicate
-from labcrane.analysis.indicator_settings import IndicatorSettings
-from labcrane.analysis.operator_tests import OperatorTest
 from labcrane.analysis.report.workbook import write_csv, write_workbook
+from labcrane.analysis.scoring.indicator import Performance, indicate
+from labcrane.analysis.scoring.operator_tests import OperatorTest
+from labcrane.analysis.scoring.settings import IndicatorSettings
 from labcrane.cli.app import main
 from labcrane.cli.commands import simulate
 from labcrane.participants import recovery

@@ -11,8 +11,8 @@ from cranes import needs_bullet
 
 import labcrane
 from labcrane.analysis.cohort import find_cohort
-from labcrane.analysis.indicator_settings import IndicatorSettings
-from labcrane.analysis.operator_tests import operator_tests
+from labcrane.analysis.scoring.operator_tests import operator_tests
+from labcrane.analysis.scoring.settings import IndicatorSettings
 from labcrane.core.records import Event
 from labcrane.machines.library import load_machine
 from labcrane.recording.participant_file.reader import SessionRecord

@@ -8,8 +8,8 @@ from statistics import fmean
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.advice import Advice, familiarity, fatigue, suggest
-from labcrane.analysis.indicator import FORMULA, OBJECTIVE, SUBJECTIVE
-from labcrane.analysis.operator_tests import DETECTION, OperatorTest
+from labcrane.analysis.scoring.indicator import FORMULA, OBJECTIVE, SUBJECTIVE
+from labcrane.analysis.scoring.operator_tests import DETECTION, OperatorTest
 
 if TYPE_CHECKING:
     from openpyxl import Workbook

@@ -11,7 +11,7 @@ from labcrane.cli.output import out
 from labcrane.errors import LabcraneError
 
 if TYPE_CHECKING:
-    from labcrane.analysis.indicator_settings import IndicatorSettings
+    from labcrane.analysis.scoring.settings import IndicatorSettings
 
 HALF_FINISHED = "half-finished"
 
@@ -32,8 +32,8 @@ def score(
     """Write the evaluation workbook: performance indicator, trend, what to practise next."""
     from rich.table import Table
 
-    from labcrane.analysis.operator_tests import operator_tests
     from labcrane.analysis.report.workbook import advice, write_csv, write_workbook
+    from labcrane.analysis.scoring.operator_tests import operator_tests
     from labcrane.participants.products import product
 
     path = into or folder / "evaluation.xlsx"
@@ -69,7 +69,7 @@ def score(
 
 
 def _settings(path: Path) -> "IndicatorSettings":
-    from labcrane.analysis.indicator_settings import IndicatorSettings
+    from labcrane.analysis.scoring.settings import IndicatorSettings
     from labcrane.files.yaml import YamlFile
 
     return YamlFile.read(path).checked(IndicatorSettings)

@@ -10,7 +10,7 @@ not in the text that is left of it and was reconstructed (docs/indicator.md)::
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from labcrane.analysis.indicator_settings import IndicatorSettings
+from labcrane.analysis.scoring.settings import IndicatorSettings
 from labcrane.errors import LabcraneError
 
 FORMULA = "typiak-2024-reconstruction-1"

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Cohort
-from labcrane.analysis.indicator import Indicator, Performance, indicate
-from labcrane.analysis.indicator_settings import COUNTS, RATINGS, TIME, IndicatorSettings
+from labcrane.analysis.scoring.indicator import Indicator, Performance, indicate
+from labcrane.analysis.scoring.settings import COUNTS, RATINGS, TIME, IndicatorSettings
 from labcrane.errors import LabcraneError, RecordingError
 from labcrane.recording.participant_file.reader import Recording, SessionRecord
 from labcrane.recording.participant_file.writer import DAMAGED
