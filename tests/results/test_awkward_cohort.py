@@ -15,8 +15,8 @@ from labcrane.analysis.measures import measures_of
 from labcrane.approval.codebook import codebook
 from labcrane.cli.app import main
 from results.awkward import ANSWERS, FORMULA, HALF_FINISHED, NULL, Awkward
-from results.consumers import needs_octave, octave, table
-from results.test_bids import errors, validated
+from results.consumers import bids_errors, needs_octave, octave, table
+from results.test_bids import validated
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("awkward")]
 
@@ -94,7 +94,7 @@ def test_a_result_has_one_definition_wherever_it_is_read(
 
 @validated
 def test_the_bids_validator_finds_no_error(awkward: Awkward) -> None:
-    assert errors(awkward.export("bids")) == []
+    assert bids_errors(awkward.export("bids")) == []
 
 
 def answers_in(path: Path) -> pd.DataFrame:
