@@ -1,13 +1,14 @@
 """All benchmarks, and one table of their ratios.
 
-    python -m benchmarks [--check] [--only tick,start_up] [--quick]
+    python -m benchmarks [--check] [--only tick,start_up] [--brief]
 
 Writes ``benchmarks/RESULTS.md``, with the machine and the date; rows of benchmarks that were left
 out are kept as they were. Absolute figures of a shared computer are noise: every row has a bare
 reference that ran beside it, and the ratio is what counts, with the most that is promised of it.
 With ``--check``, the exit status is 1 when a promise is missed, and each that is missed is named.
 A benchmark that cannot be run is missed too, with the reason, and the others go on.
-Takes three quarters of an hour; the computer should be idle.
+``--brief`` runs each for an instant, to see that it can be run: its figures mean nothing and are
+not written. All of them take three quarters of an hour; the computer should be idle.
 """
 
 import argparse
@@ -38,7 +39,7 @@ def main(words: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", help=f"some of {','.join(SUBJECTS)}")
-    parser.add_argument("--quick", action="store_true", help="four participants in cohort")
+    parser.add_argument("--brief", action="store_true", help="run each for an instant; no table")
     parser.add_argument("--check", action="store_true", help="fail when a ratio is above its limit")
     asked = parser.parse_args(words)
     chosen = asked.only.split(",") if asked.only else list(SUBJECTS)
@@ -47,9 +48,8 @@ def main(words: Sequence[str] | None = None) -> int:
     lines, measured, failed = kept(), [], []
     for subject in chosen:
         print(f"== {subject}", flush=True)
-        few = {"participants": 4} if asked.quick and subject == "cohort" else {}
         try:
-            rows = import_module(f"benchmarks.{subject}").rows(**few)
+            rows = import_module(f"benchmarks.{subject}").rows(brief=asked.brief)
         except (Exception, SystemExit) as error:  # noqa: BLE001 - the others go on
             traceback.print_exc()
             failed.append(f"{subject} could not be run: {type(error).__name__}: {error}")
@@ -59,7 +59,11 @@ def main(words: Sequence[str] | None = None) -> int:
         measured += rows
         lines[subject] = [line(subject, row) for row in rows]
         print("\n".join(lines[subject]), flush=True)
-        write(lines)
+        if not asked.brief:
+            write(lines)
+    if asked.brief:
+        print("\n".join(f"MISSED {each}" for each in failed) or "all could be run")
+        return 1 if failed else 0
     beyond = [*failed, *missed(measured)]
     print("\n".join(f"MISSED {each}" for each in beyond) or f"all {len(measured)} are kept")
     others = [text for each in lines if each not in chosen for text in lines[each]]

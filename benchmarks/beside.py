@@ -25,24 +25,26 @@ from labcrane.streams.network import LOOPBACK
 TESTS = Path(__file__).parents[1] / "tests"
 RATE_HZ = 240.0
 QUARTER_MS = 250.0 / RATE_HZ
-SPELL_S, SPELLS, RECONNECTS = 0.7, 10, 200
-LABORATORY_S = 60
-SOUND_S = 60.0
+SPELL_S, SPELLS, RECONNECTS = 0.7, 10, 20
+"""How long a spell is, how many of each kind there are, and the connections in one."""
+
+SECONDS, BRIEF_S = 60, 5
 PERIOD_S = 1024 / 48000
 
 
-def rows() -> list[Row]:
+def rows(*, brief: bool = False) -> list[Row]:
     """Return all figures; in a process of its own, for the network that liblsl is told of."""
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.beside", "--json"],
+        [sys.executable, "-m", "benchmarks.beside", "--json", *(["--brief"] if brief else [])],
         check=True, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
     return loaded(done.stdout.splitlines()[-1])
 
 
-def measure(folder: Path) -> list[Row]:
+def measure(folder: Path, *, brief: bool) -> list[Row]:
     """Measure here."""
-    return [*clients(folder), laboratory(folder), sound(folder)]
+    spells, seconds = (1, BRIEF_S) if brief else (SPELLS, SECONDS)
+    return [*clients(folder, spells), laboratory(folder, seconds), sound(folder, seconds)]
 
 
 def late_ms(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -52,7 +54,7 @@ def late_ms(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return due, 1e3 * (loop["woke"].to_numpy() - due)
 
 
-def clients(folder: Path) -> list[Row]:
+def clients(folder: Path, count: int) -> list[Row]:
     """Let clients reconnect and never read, in turns with quiet spells."""
     from faults.sessions import unique, wait_for  # noqa: PLC0415 - needs the path
     from pages.room import STUDY, a_room  # noqa: PLC0415
@@ -68,14 +70,14 @@ def clients(folder: Path) -> list[Row]:
         session = room.process("session")
         cookie = cookie_of(room, "supervisor")
         request = socket_request(room, cookie).decode()
-        words = [request, cookie, str(RECONNECTS // SPELLS), str(SPELL_S)]
+        words = [request, cookie, str(RECONNECTS), str(SPELL_S)]
         program = [sys.executable, str(TESTS / "pages" / "rude.py"), str(room.port), *words]
         with subprocess.Popen(
             program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         ) as client:
             assert client.stdin is not None
             assert client.stdout is not None
-            for _ in range(SPELLS):
+            for _ in range(count):
                 for kind, times in spells.items():
                     before, began = sum(session.cpu_times()[:2]), time.perf_counter()
                     if kind == "rude":
@@ -105,7 +107,7 @@ def clients(folder: Path) -> list[Row]:
     ]  # fmt: skip
 
 
-def laboratory(folder: Path) -> Row:
+def laboratory(folder: Path, length: int) -> Row:
     """Record 64 channels at 1 kHz, gaze and markers beside a session, and nothing beside it."""
     from faults.sessions import labcrane, unique  # noqa: PLC0415
     from faults.test_load import NEEDS, a_study  # noqa: PLC0415
@@ -113,7 +115,7 @@ def laboratory(folder: Path) -> Row:
     word = unique("beside")
     program = [sys.executable, str(TESTS / "faults" / "laboratory.py"), word]
     devices = subprocess.Popen(
-        [*program, str(2 * LABORATORY_S)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [*program, str(2 * length)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     usual = {}
     try:
@@ -123,7 +125,7 @@ def laboratory(folder: Path) -> Row:
         devices.stdin.write("go\n")
         devices.stdin.flush()
         for name, needs in (("P001", NEEDS.format(word=word)), ("P002", "")):
-            study = a_study(folder / f"{name}.yaml", LABORATORY_S, needs)
+            study = a_study(folder / f"{name}.yaml", length, needs)
             data = folder / "laboratory"
             run = labcrane("run", study, "--participant", name, "--simulate", "--data", data)
             said, _ = run.communicate()
@@ -139,8 +141,8 @@ def laboratory(folder: Path) -> Row:
     return Row("beside", what, usual["P001"], bare, "without, and a quarter of a tick", 1.0)
 
 
-def sound(folder: Path) -> Row:
-    """Play a minute of a session's sound in real time while every core is kept busy."""
+def sound(folder: Path, length: float) -> Row:
+    """Play a session's sound in real time while every core is kept busy."""
     from busy_computer import crowded_computer  # noqa: PLC0415
     from faults.jack_session import a_jack_session  # noqa: PLC0415
     from faults.sessions import unique  # noqa: PLC0415
@@ -149,11 +151,11 @@ def sound(folder: Path) -> Row:
     (folder / "sound").mkdir()
     study = STUDY.format(study=unique("sound"))
     with crowded_computer() as standstill:
-        session, _ = a_jack_session(study, folder / "sound", Ending(SOUND_S), real_time=True)
+        session, _ = a_jack_session(study, folder / "sound", Ending(length), real_time=True)
     heard = session.streams["labcrane.feedback.tone"].data
     missed = float(heard["tone.missed"].iloc[-1])
     stood = float(np.ceil(standstill.total_s / PERIOD_S))
-    what = f"blocks missed in {SOUND_S:g} s of sound on a busy computer, and one"
+    what = f"blocks missed in {length:g} s of sound on a busy computer, and one"
     return Row("beside", what, 1.0 + missed, 1.0 + stood, "for which it stood still, and one", 1.0)
 
 
@@ -165,7 +167,7 @@ def main() -> None:
         config = folder / "lsl_api.cfg"
         config.write_text(LOOPBACK.replace("[lab]", f"[lab]\nSessionID = beside-{os.getpid()}"))
         os.environ["LSLAPICFG"] = str(config)
-        found = measure(folder)
+        found = measure(folder, brief="--brief" in sys.argv)
     show(found)
     if "--json" in sys.argv:
         print(dumped(found))

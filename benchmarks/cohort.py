@@ -45,14 +45,22 @@ POWER_S = 600.0
 """What so many cohorts of 36 may take, with their pool, in seconds of the processor."""
 
 
-def rows(participants: int = 36) -> list[Row]:
+PARTICIPANTS = 36
+
+
+def rows(*, brief: bool = False) -> list[Row]:
     """Return all figures."""
+    return rows_of(4, FEW + 4) if brief else rows_of(PARTICIPANTS)
+
+
+def rows_of(participants: int, more: int = MORE) -> list[Row]:
+    """Return all figures of so many; of power, from cohorts of two numbers, ``FEW`` and more."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         found = one_core(folder, participants)
         found += two_cores_and_memory(folder, participants)
         found.append(pilot(folder, participants))
-        found += [power(folder, test, participants) for test in ("trend", "anova")]
+        found += [power(folder, test, participants, more) for test in ("trend", "anova")]
     return found
 
 
@@ -167,18 +175,18 @@ def pilot(folder: Path, participants: int) -> Row:
     return Row("cohort", what, ours, bare, f"bare PyBullet, {ticks} ticks", PILOT_TIMES)
 
 
-def power(folder: Path, test: str, size: int) -> Row:
+def power(folder: Path, test: str, size: int, more: int) -> Row:
     """Plan the crane study by one of the report's tests: pool and few cohorts, then some more."""
     words = ["power", str(CRANE_PILOT), "--out", str(folder / f"power-{test}"), "--test", test]
     words += ["--participants", str(size), "--effect", "movement_time~sequence", "--cohorts"]
     first = spent_s(*words, str(FEW))
-    few, more = (spent_s(*words, str(count)) for count in (FEW, MORE))  # the pool is there
-    whole = first + (COHORTS - FEW) * (more - few) / (MORE - FEW)
+    few_s, more_s = (spent_s(*words, str(count)) for count in (FEW, more))  # the pool is there
+    whole = first + (COHORTS - FEW) * (more_s - few_s) / (more - FEW)
     what = f"power, {test}, {COHORTS} cohorts of {size}, processor's s"
     return Row("cohort", what, whole, POWER_S, "promised", 1.0)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--participants", type=int, default=36)
-    show(rows(parser.parse_args().participants))
+    parser.add_argument("--participants", type=int, default=PARTICIPANTS)
+    show(rows_of(parser.parse_args().participants))

@@ -77,7 +77,15 @@ report()
 """
 
 
-def rows(minutes: float = 60.0) -> list[Row]:
+MINUTES = 60.0
+
+
+def rows(*, brief: bool = False) -> list[Row]:
+    """Return all figures of an hour."""
+    return rows_of(0.1 if brief else MINUTES)
+
+
+def rows_of(minutes: float) -> list[Row]:
     """Return all figures of a session so long."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "P001"
@@ -123,5 +131,5 @@ def used(code: str, folder: Path, count: int) -> tuple[float, float]:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=60.0)
-    show(rows(parser.parse_args().minutes))
+    parser.add_argument("--minutes", type=float, default=MINUTES)
+    show(rows_of(parser.parse_args().minutes))

@@ -23,10 +23,10 @@ from labcrane.testing import RATE_HZ, ch8, make_run
 ROUNDS, CALLS, CALLS_PER_TICK = 200, 500, 6
 
 
-def fastest(step: Callable[[], object]) -> float:
+def fastest(step: Callable[[], object], rounds: int) -> float:
     """Return the time of a call in the fastest round, in seconds."""
     best = float("inf")
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         began = time.perf_counter()
         for _ in range(CALLS):
             step()
@@ -34,7 +34,7 @@ def fastest(step: Callable[[], object]) -> float:
     return best
 
 
-def steps() -> tuple[float, float]:
+def steps(rounds: int = ROUNDS) -> tuple[float, float]:
     """Return how long a step of a crane takes, bare and watched, in seconds."""
     machine, oversight = ch8(), CallMonitor()
     offer = discover().find(Dynamics, "kinematic_crane")
@@ -48,14 +48,14 @@ def steps() -> tuple[float, float]:
         tempfile.TemporaryDirectory() as folder,
         oversight.published(Path(folder) / "bench.where"),
     ):
-        alone = fastest(lambda: bare.step(command, 1 / RATE_HZ))
-        seen = fastest(lambda: kept.step(command, 1 / RATE_HZ))
+        alone = fastest(lambda: bare.step(command, 1 / RATE_HZ), rounds)
+        seen = fastest(lambda: kept.step(command, 1 / RATE_HZ), rounds)
     return alone, seen
 
 
-def rows() -> list[Row]:
+def rows(*, brief: bool = False) -> list[Row]:
     """Return what a watched step costs beside a bare one."""
-    alone, seen = steps()
+    alone, seen = steps(1 if brief else ROUNDS)
     return [
         Row("oversight", "a watched step of a crane, us", 1e6 * seen, 1e6 * alone, "unwatched", 2.5)
     ]

@@ -29,18 +29,19 @@ BROWSERS, TURNS, WATCHED_S, REST_S = 4, 2, 20.0, 600
 LAST_IN_LINE = 19
 
 
-def rows() -> list[Row]:
+def rows(*, brief: bool = False) -> list[Row]:
     """Return what the pages cost the loop, and how long the slowest of the notes took."""
+    turns, watched_s, siege_s = (1, 3.0, 5.0) if brief else (TURNS, WATCHED_S, SECONDS)
     sys.path.insert(0, str(TESTS))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if "LSLAPICFG" not in os.environ:
             (folder / "lsl_api.cfg").write_text(LSL)
             os.environ["LSLAPICFG"] = str(folder / "lsl_api.cfg")
-        return [*cost(folder), siege(folder)]
+        return [*cost(folder, turns, watched_s), siege(folder, siege_s)]
 
 
-def cost(folder: Path) -> list[Row]:
+def cost(folder: Path, turns: int, watched_s: float) -> list[Row]:
     """Return lateness and processor time of a session, watched in four browsers and not at all."""
     from faults.sessions import unique  # noqa: PLC0415
     from pages.room import STUDY, a_browser  # noqa: PLC0415
@@ -51,7 +52,7 @@ def cost(folder: Path) -> list[Row]:
     share: dict[bool, list[float]] = {False: [], True: []}
     late: dict[bool, list[float]] = {False: [], True: []}
     with a_browser(folder / "profile") as browser:
-        for turn in range(TURNS):
+        for turn in range(turns):
             for watched in (False, True):
                 data = folder / f"{turn}{watched}"
                 with a_session(protocol, data, watched=watched) as (launcher, session):
@@ -59,14 +60,14 @@ def cost(folder: Path) -> list[Row]:
                         watch(browser, link_of(launcher))
                         behind(browser)
                     used, began = sum(session.cpu_times()[:2]), time.perf_counter()
-                    time.sleep(WATCHED_S)
+                    time.sleep(watched_s)
                     ended = time.perf_counter()
                     used = sum(session.cpu_times()[:2]) - used
                     if watched:
                         assert all(map(str.strip, clocks(browser))), "a browser shows nothing"
                 due, lateness = late_ms(recovered(data))
                 there = (due >= began) & (due < ended)
-                assert there.sum() > 0.9 * WATCHED_S * 240.0, "the ticks are of another time"
+                assert there.sum() > 0.9 * watched_s * 240.0, "the ticks are of another time"
                 share[watched].append(used / (ended - began))
                 late[watched].append(float(np.quantile(lateness[there], 0.99)))
                 kind = f"{BROWSERS} browsers" if watched else "no pages"
@@ -161,7 +162,7 @@ def recovered(data: Path) -> Path:
     return data / "P001-SIMULATED" / "P001-SIMULATED.h5"
 
 
-def siege(folder: Path) -> Row:
+def siege(folder: Path, seconds: float) -> Row:
     """Return how long the slowest of the notes took while the pages were attacked.
 
     The attackers come from other addresses: pages that are refused and pages that are allowed,
@@ -179,7 +180,7 @@ def siege(folder: Path) -> Row:
     with a_room(protocol, folder / "data") as room:
         wait_for(lambda: room.process("pages"))
         examiner, guest = (cookie_of(room, page) for page in ("supervisor", "participant"))
-        told = attack(room, examiner, guest, SECONDS)
+        told = attack(room, examiner, guest, seconds)
         ask(room, "POST", "/orders/end", examiner)
         room.ended()
     assert set(told.notes) == {202}, "the right people are let in"

@@ -37,10 +37,11 @@ views:
 """
 
 
-def rows() -> list[Row]:
+def rows(*, brief: bool = False) -> list[Row]:
     """Return all figures; in a process of its own, for the network that liblsl is told of."""
+    seconds = 5.0 if brief else SECONDS
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.real_time", "--json"],
+        [sys.executable, "-m", "benchmarks.real_time", "--json", str(seconds)],
         check=True, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
     return loaded(done.stdout.splitlines()[-1])

@@ -42,12 +42,13 @@ def timed(call: Callable[[], object]) -> float:
     return time.perf_counter() - began
 
 
-def rows() -> list[Row]:
+def rows(*, brief: bool = False) -> list[Row]:
     """Return all ratios of a recording of five minutes."""
+    minutes = 0.1 if brief else 5.0
     found: list[Row] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        data = a_movement(int(5 * 60 * RATE_HZ))
+        data = a_movement(int(60.0 * minutes * RATE_HZ))
         journal = write_through(folder, data, 0.0, found)
         consolidation(folder, journal, data, found)
         loading(journal, found)

@@ -110,8 +110,9 @@ def times(study: Study, folder: Path, count: int) -> tuple[np.ndarray, Frame, Ru
     return np.diff(ends)[WARM_UP:], last[0], run
 
 
-def rows(ticks: dict[str, int] | None = None, rounds: int = ROUNDS) -> list[Row]:
+def rows(*, brief: bool = False) -> list[Row]:
     """Return what ticks and pictures of scenarios take beside those of the kinematic study."""
+    rounds, ticks = (1, dict.fromkeys(TICKS, 2 * WARM_UP)) if brief else (ROUNDS, TICKS)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         there = studies(folder)
@@ -120,7 +121,7 @@ def rows(ticks: dict[str, int] | None = None, rounds: int = ROUNDS) -> list[Row]
         for _ in range(rounds):
             for each, study in there.items():
                 gc.collect()
-                took, *frames[each] = times(study, folder, (ticks or TICKS)[each])
+                took, *frames[each] = times(study, folder, ticks[each])
                 taken[each].append(took)
         return [*tick_rows(taken), picture_row(there, frames)]
 

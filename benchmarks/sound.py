@@ -15,13 +15,14 @@ from labcrane_sonification.tone import Tone, tone
 ROUNDS, SECONDS = 5, 4.0
 
 
-def rows() -> list[Row]:
+def rows(*, brief: bool = False) -> list[Row]:
     """Return what a block with a change costs beside one without."""
+    rounds = 1 if brief else ROUNDS
     settings = SonificationSettings(block=256, ramp_s=0.0)
     synth = Synth(offline_server(settings), settings)
     count = round(SECONDS * settings.rate_hz / settings.block)
     ours, bare = [], []
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         ours.append(1e6 * SECONDS / _speed(synth, settings) / count)
         began = time.perf_counter()
         for _ in range(count):

@@ -35,16 +35,17 @@ PATIENCE_S = 15.0
 """How long somebody at a desk is to wait for a rehearsal of the aiming study, at most."""
 
 
-def rows() -> list[Row]:
+def rows(*, brief: bool = False) -> list[Row]:
     """Return what start-up takes beside two libraries, and a rehearsal in seconds."""
+    rounds, rehearsals = (1, 1) if brief else (ROUNDS, REHEARSALS)
     took: dict[str, list[float]] = {name: [] for name in CASES}
     with tempfile.TemporaryDirectory() as compiled:
         keeping = {k: value for k, value in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
         keeping["PYTHONPYCACHEPREFIX"] = compiled
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             for name, words in CASES.items():
                 took[name].append(_seconds(words, keeping))
-        rehearsed = max(_seconds(REHEARSAL, keeping) for _ in range(REHEARSALS))
+        rehearsed = max(_seconds(REHEARSAL, keeping) for _ in range(rehearsals))
     bare = min(took["bare"])
     return [
         *(

@@ -43,6 +43,7 @@ HEAD = (
     "|---|---|---|---|---|---|",
 )
 SHORT = ("--seconds", "120", "--restarts", "2", "--draws", "2")
+INSTANT = ("--seconds", "5", "--restarts", "1", "--draws", "1")
 
 
 @dataclass(frozen=True)
@@ -66,11 +67,11 @@ QUIET = (
 BUSY = (Case("100 ppm, both cores busy", 0.02), Case("chunks, both cores busy", 0.3, mode=CHUNK))
 
 
-def rows() -> list[Row]:
+def rows(*, brief: bool = False) -> list[Row]:
     """Return what is promised of unkind devices, of each case and of restarts; five minutes."""
     # In a process of its own: whoever has loaded liblsl has told it which network to use.
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.sync", *SHORT, "--json"],
+        [sys.executable, "-m", "benchmarks.sync", *(INSTANT if brief else SHORT), "--json"],
         check=False, capture_output=True, text=True,
     )  # fmt: skip
     *said, last = done.stdout.splitlines() or [""]

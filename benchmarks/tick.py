@@ -180,12 +180,13 @@ def bare_times(engine: BareEngine, count: int) -> np.ndarray:
     return np.diff(ends)
 
 
-def rows() -> list[Row]:
-    """Return the median cost of a whole tick beside a bare one."""
+def rows(*, brief: bool = False) -> list[Row]:
+    """Return the cost of whole ticks and steps of engines, and the highest rate held."""
     use_loopback()
+    rounds, count, rates_hz = (1, 2 * WARM_UP, RATES_HZ[:1]) if brief else (ROUNDS, TICKS, RATES_HZ)
     with tempfile.TemporaryDirectory() as name:
-        found = [*costs(cost(Path(name))), engine_row(engine_times())]
-        return [*found, rate_row(rates(Path(name)))]
+        found = [*costs(cost(Path(name), rounds, count)), engine_row(engine_times(rounds, count))]
+        return [*found, rate_row(rates(Path(name), rates_hz=rates_hz))]
 
 
 def costs(found: Mapping[str, Sequence[np.ndarray]]) -> list[Row]:
@@ -290,7 +291,11 @@ def lateness(kind: str, rate: int, folder: Path) -> float:
     return late([tick.due for tick in seen], [tick.woke for tick in seen], rate)
 
 
-def rates(folder: Path, measure: Callable[[str, int, Path], float] = lateness) -> dict[str, float]:
+def rates(
+    folder: Path,
+    measure: Callable[[str, int, Path], float] = lateness,
+    rates_hz: Sequence[int] = RATES_HZ,
+) -> dict[str, float]:
     """Print late ticks at rising rates; return in Hz what each loop holds before it falls behind.
 
     A rate above one that is not held does not count; nan is a loop that does not hold the lowest.
@@ -299,7 +304,7 @@ def rates(folder: Path, measure: Callable[[str, int, Path], float] = lateness) -
     print(f"{'rate Hz':>8} {'empty loop':>12} {'whole loop':>12}")
     held = dict.fromkeys(("empty", "whole"), math.nan)
     climbing = list(held)
-    for rate in RATES_HZ:
+    for rate in rates_hz:
         shares = {kind: measure(kind, rate, folder) for kind in climbing}
         cells = (f"{shares[kind]:.2%}" if kind in shares else "-" for kind in held)
         print(" ".join([f"{rate:8}", *(f"{cell:>12}" for cell in cells)]))

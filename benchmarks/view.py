@@ -42,8 +42,9 @@ def a_scene() -> Run:
     return replace(make_run(machine, task=TARGETS), bodies=tuple(boxes))
 
 
-def rows() -> list[Row]:
+def rows(*, brief: bool = False) -> list[Row]:
     """Print and return both figures for either renderer."""
+    rounds = 1 if brief else ROUNDS
     run, found = a_scene(), []
     for renderer in ("auto", "software"):
         settings = ViewSettings(display="hidden", renderer=renderer, supervisor={"rate_hz": 10})
@@ -53,7 +54,7 @@ def rows() -> list[Row]:
         print(f"{view.metadata()['renderer']}, {view.metadata()['size']}")
         shown = [_seconds(view, run, whole=True)]  # warms up
         shown, bare = [], []
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             shown.append(_seconds(view, run, whole=True))
             bare.append(_seconds(view, run, whole=False))
         ratio = np.median(shown) / np.median(bare)

@@ -27,7 +27,7 @@ def benchmarks(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> types.ModuleT
     row = importlib.import_module("benchmarks.table").Row
     for name, ratio in SUBJECTS.items():
         module = types.ModuleType(f"benchmarks.{name}")
-        module.rows = lambda name=name, ratio=ratio: [
+        module.rows = lambda name=name, ratio=ratio, **_: [
             row(name, "a step, us", 3.0 * ratio, 3.0, "a bare one", 2.0)
         ]
         monkeypatch.setitem(sys.modules, module.__name__, module)
@@ -79,7 +79,7 @@ def test_a_benchmark_that_cannot_be_run_is_named_and_the_others_go_on(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def rows() -> list[object]:
+    def rows(**_: bool) -> list[object]:
         raise error
 
     benchmarks.main([])
@@ -99,7 +99,7 @@ def test_a_benchmark_without_a_figure_is_missed(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(sys.modules["benchmarks.fine"], "rows", list)
+    monkeypatch.setattr(sys.modules["benchmarks.fine"], "rows", lambda **_: [])
     assert benchmarks.main(["--only", "fine"]) == 1
     assert "MISSED fine gave no figure\n" in capsys.readouterr().out
 
@@ -129,6 +129,28 @@ def test_every_benchmark_makes_rows_and_says_their_limits_itself() -> None:
         source = Path(main.__file__).with_name(f"{subject}.py").read_text(encoding="utf-8")
         calls = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
         assert any(ast.unparse(call.func) == "Row" for call in calls), subject
+
+
+IN_SECONDS = ("scenario", "oversight", "recording", "length", "signals", "sound", "start_up")
+
+
+def marked(subject: str) -> object:
+    mark = pytest.mark.slow if subject in IN_SECONDS else pytest.mark.long
+    return pytest.param(subject, marks=mark)
+
+
+@needs("chromium", "jackd", "pybullet")
+@pytest.mark.parametrize(
+    "subject", [marked(each) for each in importlib.import_module("benchmarks.__main__").SUBJECTS]
+)
+def test_every_benchmark_can_be_run(subject: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks", "--brief", "--only", subject],
+        cwd=Path(__file__).parents[1], capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert f"| {subject} | " in done.stdout
+    assert done.stdout.endswith("all could be run\n")
 
 
 def test_a_ratio_that_is_no_number_is_missed() -> None:
