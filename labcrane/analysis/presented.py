@@ -81,7 +81,7 @@ PRESENTED: Mapping[str, tuple[str, str]] = {
     ),
     "presentation_failed": (
         "1",
-        "1 where that is less than the protocol's presented: asks for: it counts for no average",
+        "1 where that is less than presented: in the protocol asks for; averages leave it out",
     ),
 }
 """Unit and meaning of the columns of :func:`presented`."""
@@ -229,8 +229,8 @@ def judge_presented(session: "SessionRecord") -> tuple[Finding, ...]:
     said = [f"trial {row['trial']:g}: {in_words(row)}" for row in rows[:NAMED]]
     more = f"; and {len(rows) - NAMED} more" if len(rows) > NAMED else ""
     text = (
-        f"of {len(rows)} of {len(table)} movements the operator was shown too little, and they "
-        f"count for no average ({'; '.join(said)}{more})"
+        f"in {len(rows)} of {len(table)} movements the operator was shown too little; averages "
+        f"leave them out ({'; '.join(said)}{more})"
     )
     advice = "close other programs, look at the graphics driver, or choose a lower quality"
     return (

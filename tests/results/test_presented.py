@@ -122,7 +122,7 @@ def test_the_sync_report_names_movements_that_were_not_shown(
     (finding,) = session.sync_report["presented"]
     assert session.sync_report["verdict"] == finding["verdict"] == "FAIL"  # 1 of 8 is over 5 %
     assert (
-        f"of 1 of {len(session.trials)} movements the operator was shown too little"
+        f"in 1 of {len(session.trials)} movements the operator was shown too little"
         in (finding["text"])
     )
     assert f"trial {third['trial']:g}: " in finding["text"]
