@@ -54,10 +54,13 @@ class WakeLock:
 @contextmanager
 def wake_lock() -> Iterator[WakeLock]:
     """Keep the screen awake while the block lasts, as far as the system lets us."""
-    if sys.platform == "win32":
-        with _windows() as lock:
-            yield lock
-        return
+    with _windows() if sys.platform == "win32" else _desktop() as lock:
+        yield lock
+
+
+@contextmanager
+def _desktop() -> Iterator[WakeLock]:
+    """Ask every program that is installed."""
     held, failed = [], []
     with ExitStack() as kept:
         for program, *arguments in PROGRAMS:
@@ -100,7 +103,7 @@ def _asked(command: tuple[str, ...]) -> Iterator[str]:
 @contextmanager
 def _windows() -> Iterator[WakeLock]:
     """Ask Windows, for the calling thread; it forgets when the thread ends."""
-    ask = ctypes.WinDLL("kernel32").SetThreadExecutionState  # type: ignore[attr-defined]  # Windows
+    ask = ctypes.WinDLL("kernel32").SetThreadExecutionState  # type: ignore[attr-defined, unused-ignore]
     if not ask(ES_CONTINUOUS | ES_SYSTEM_REQUIRED | ES_DISPLAY_REQUIRED):
         yield WakeLock(failed=(f"{WINDOWS}: Windows refused",))
         return
