@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from labcrane.recording.overlap import sample_keys, union
@@ -52,12 +52,18 @@ def test_parts_of_one_sequence_give_it_back(length, one, other, seed) -> None:
 def test_a_take_over_among_samples_that_repeat_loses_and_doubles_none(
     symbols, length, start, end, seed
 ) -> None:
-    """The second begins within the first and outlives it; both have all there was meanwhile."""
+    """The second begins within the first and outlives it; both have all there was meanwhile.
+
+    What each of them has once is one sample: by others the two could be put together in two ways.
+    """
     random = np.random.default_rng(seed)
     whole = random.integers(0, symbols, length).tolist()
     whole[int(start * length) : int(start * length) + 1] = [99]  # one sample of the overlap is rare
     a, b = int(start * length), int(start * length) + 1 + int(end * (length - start * length))
-    assert joined(whole[:b], whole[a:]) == whole
+    first, second = whole[:b], whole[a:]
+    once = [each for each in whole if first.count(each) == second.count(each) == 1]
+    assume(all(first.index(each) - a == second.index(each) for each in once))
+    assert joined(first, second) == whole
 
 
 def test_equal_samples_are_known_by_every_bit_of_stamp_and_values() -> None:
