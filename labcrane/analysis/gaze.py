@@ -17,14 +17,19 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.analysis.cohort import Participant
-from labcrane.analysis.gaze_streams import CHANNEL, gaze_stream, place, window_stream
+from labcrane.analysis.gaze_streams import (
+    CHANNEL,
+    gaze_stream,
+    place,
+    window_pictures,
+    window_stream,
+)
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
 
-AREAS = ".areas"
 SIDES = ("left", "top", "right", "bottom")
 ROUNDING_S = 1e-9
 """Samples that hold for as long as a look lasts make one."""
@@ -121,7 +126,7 @@ def looks(session: SessionRecord, delay_s: float = 0.0, stream: str = "") -> Loo
         found = [names[value] for value in values]
         tracked = np.array([not _is_lost(value) for value in values], bool)
         return Looks(gaze.time, found, tracked, sorted({*names.values()} - {""}))
-    pictures = next((one for one in session.streams.values() if one.name.endswith(AREAS)), None)
+    pictures = window_pictures(session)
     if pictures is None or not (columns := area_columns(pictures)):
         return None
     where = gaze.values(place(gaze))

@@ -4,6 +4,7 @@ A stream of LSL type ``Gaze`` is measured where a channel ``aoi`` names what is 
 two channels in pixels say where in the participant's window. Pixels of a head-mounted tracker's
 scene camera look the same, so they are taken for the window's only where somebody says so: the
 protocol (``space``), ``labcrane resync --space``, or ``coordinate_system`` in the stream's header.
+They are joined to the areas of the one view that the operator sees (:func:`window_pictures`).
 """
 
 import re
@@ -11,6 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Participant
+from labcrane.analysis.presented import LOG
 from labcrane.errors import RecordingError, nearest
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 KIND, CHANNEL = "Gaze", "aoi"
+AREAS = ".areas"
 PIXELS = frozenset({"px", "pixel", "pixels"})
 
 SCREEN, SCENE = "screen", "scene"
@@ -64,6 +67,15 @@ def place(gaze: Stream) -> tuple[str, ...]:
     return columns if columns and gaze_space(gaze) == SCREEN else ()
 
 
+def window_pictures(session: SessionRecord) -> Stream | None:
+    """Return where things were in the pictures of the operator's window; None for none or several.
+
+    An examiner's view records its areas as well, and nobody's gaze is in its pixels.
+    """
+    found = _pictures(session)
+    return found[0] if len(found) == 1 else None
+
+
 def gaze_space(gaze: Stream) -> str:
     """Return what a stream's places are in: ``screen``, ``scene``, or nothing where nobody says.
 
@@ -99,6 +111,15 @@ def unmeasured(session: SessionRecord) -> list[tuple[str, str]]:
             )
         found.append((each.name, why))
     several = _candidates(session)
+    pictures = [each.name.removeprefix(LOG).removesuffix(AREAS) for each in _pictures(session)]
+    by_place = [each for each in several if CHANNEL not in each.units]
+    if by_place and len(pictures) > 1:
+        views = " and ".join(map(repr, pictures))
+        why = (
+            f"is in pixels of the window, and of the operator's views {views} nobody says which; "
+            "join it by hand with labcrane.analysis.gaze.looks_on_screen (docs/devices.md)"
+        )
+        return [*found, *((each.name, why) for each in by_place)]
     names = " and ".join(repr(each.name) for each in several)
     why = f"could be measured as well as others: {names}; say which, by gaze_stream='NAME'"
     return [*found, *((each.name, f"{why} of MeasureSettings") for each in several[1:] and several)]
@@ -124,6 +145,19 @@ def _candidates(session: SessionRecord) -> Sequence[Stream]:
     """Return the streams that could be measured; those that name areas know more than others."""
     named = [each for each in _gaze(session) if CHANNEL in each.units]
     return named or [each for each in _gaze(session) if place(each)]
+
+
+def _pictures(session: SessionRecord) -> list[Stream]:
+    """Return the areas of each view that the operator sees; of a view that is not named, too."""
+    components = session.context.get("components", {})
+    aside = {
+        f"{LOG}{part.removeprefix('views.')}{AREAS}"
+        for part, choice in components.items()
+        if part.startswith("views.")
+        and choice.get("settings", {}).get("seen_by", "operator") != "operator"
+    }
+    streams = session.streams.values()
+    return [one for one in streams if one.name.endswith(AREAS) and one.name not in aside]
 
 
 def _in_pixels(gaze: Stream) -> tuple[str, ...]:

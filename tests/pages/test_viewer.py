@@ -4,8 +4,9 @@ import random
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -158,6 +159,8 @@ def test_gaze_that_is_named_by_area_needs_no_picture_and_a_session_without_gaze_
 
     class Recorded:
         """A session with nothing but eyes."""
+
+        context: Mapping[str, object] = MappingProxyType({})
 
         def __init__(self) -> None:
             self.streams = {"eyes": Eyes()}

@@ -5,6 +5,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
+import h5py
 import pandas as pd
 import pytest
 
@@ -18,7 +19,7 @@ from labcrane.cli.app import main
 from labcrane.recording import SessionRecord, Stream
 from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.web.viewer.glances import Glances
-from results.recorded import record, study
+from results.recorded import STUDY, record, study
 
 
 def resync(path: Path, *declared: str) -> int:
@@ -140,3 +141,62 @@ def test_a_header_states_the_space_at_its_channels_or_once(stated: str, is_in: s
         assert gaze_space(cast(Stream, SimpleNamespace(attrs={}, header=header))) == is_in
         declared = SimpleNamespace(attrs={"space": "screen"}, header=header)
         assert gaze_space(cast(Stream, declared)) == "screen"
+
+
+VIEWED = STUDY.replace(
+    "tasks:\n",
+    "views:\n"
+    "  aside: {use: view, seen_by: examiner, camera: free}\n"
+    "  cab: {use: view, camera: cab}\n"
+    "tasks:\n",
+    1,
+)
+
+
+def with_second_view(path: Path, folder: Path, name: str) -> SessionRecord:
+    """Return the recording with the areas of another view, which has all of them elsewhere."""
+    copied = Path(shutil.copy(path, folder / "P001.h5"))
+    with h5py.File(copied, "r+") as file:
+        streams = file["ses-01/streams"]
+        streams.copy("labcrane.feedback.cab.areas", f"labcrane.feedback.{name}.areas")
+        other = streams[f"labcrane.feedback.{name}.areas"]
+        other.attrs["name"] = f"labcrane.feedback.{name}.areas"
+        for column in other["data"].values():
+            column[...] = column[...] + 5000.0
+    return first(copied)
+
+
+@pytest.fixture(scope="module")
+def viewed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("viewed")
+    return record(study(folder, VIEWED), folder / "data", "P001", gaze=["cab"])
+
+
+def test_gaze_is_joined_to_the_operators_view_and_not_to_the_examiners(
+    viewed: Path, tmp_path: Path
+) -> None:
+    session = with_second_view(viewed, tmp_path, "aside")
+    alone, beside = looks(first(viewed)), looks(session)
+    assert alone is not None
+    assert beside is not None
+    assert list(beside.area) == list(alone.area)
+    assert {"target", ""} == set(beside.area)
+    start = session.streams["state"].time[0]
+    shown = Glances(session, start).at(1.0).areas
+    assert shown == Glances(first(viewed), start).at(1.0).areas
+    assert not unmeasured(session)
+
+
+def test_gaze_is_measured_on_none_of_two_views_of_the_operator_and_the_record_says_so(
+    viewed: Path, tmp_path: Path
+) -> None:
+    session = with_second_view(viewed, tmp_path, "boom")
+    assert looks(session) is None
+    assert not glanced(session)
+    assert unmeasured(session) == [
+        (
+            "eyes",
+            "is in pixels of the window, and of the operator's views 'boom' and 'cab' nobody says "
+            "which; join it by hand with labcrane.analysis.gaze.looks_on_screen (docs/devices.md)",
+        )
+    ]

@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 
 from labcrane.analysis.gaze import (
-    AREAS,
     area_columns,
     area_name,
     looks_on_screen,
 )
-from labcrane.analysis.gaze_streams import CHANNEL, gaze_stream, place
+from labcrane.analysis.gaze_streams import CHANNEL, gaze_stream, place, window_pictures
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
 from labcrane.types import FloatArray
 
@@ -62,9 +61,8 @@ class Glances:
 
     def __init__(self, record: SessionRecord, start: float) -> None:
         self._start = start
-        streams = record.streams.values()
         self._gaze = gaze_stream(record)
-        self._pictures = next((one for one in streams if one.name.endswith(AREAS)), None)
+        self._pictures = window_pictures(record)
         self._place = () if self._gaze is None else place(self._gaze)
         self._named = self._gaze is not None and CHANNEL in self._gaze.units
         self._areas = {} if self._pictures is None else area_columns(self._pictures)
