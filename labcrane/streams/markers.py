@@ -77,5 +77,14 @@ LEARNT_LATE: Mapping[str, str] = {
 """Events that lie behind when a session learns of them, and when it does. Their stamps are right,
 but a pulse is taken for the moment at which it comes."""
 
-PULSES = {event: code for event, code in CODES.items() if event not in LEARNT_LATE}
-"""Codes that go out as pulses where a protocol does not say which."""
+FRAMES = ("session.", "step.", "block.", "break.", "trial.")
+"""How events begin that only say what others belong to: they happen in one tick with these."""
+
+_SENT = sorted(
+    (event for event in CODES if event not in LEARNT_LATE),
+    key=lambda event: event.startswith(FRAMES),
+)
+
+PULSES = {event: CODES[event] for event in _SENT}
+"""Codes that go out as pulses where a protocol does not say which, the most urgent first: people
+average by what is shown and done, and the beginning of its trial or block can wait."""

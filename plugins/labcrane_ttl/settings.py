@@ -17,8 +17,9 @@ class LineSettings(Settings):
 
     codes: Annotated[dict[EventName, Code], Field(min_length=1)] | None = None
     """Code of each event that is sent, 1 to 255; of those in one tick the first in this list goes
-    out at once. All that have a number in docs/markers.md by default, by that number, but
-    ``movement.onset`` and ``movement.offset``, which are learnt late."""
+    out at once. All that have a number in docs/markers.md by default, by that number, what is shown
+    or done before what begins or ends, but ``movement.onset`` and ``movement.offset``, which are
+    learnt late."""
 
     pulse_s: NonNegativeFloat = 0.01
     """How long a code stays on the line, in seconds, at least: it is taken off in a tick. For as

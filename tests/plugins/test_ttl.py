@@ -327,22 +327,22 @@ def test_every_event_that_has_a_code_is_sent_and_noted_the_first_of_a_tick_at_on
     for number in (8, 9):
         frame.tick = Tick(number, due, due)
         triggers(frame)
-    assert all_codes.sent == [[CODES["trial.start"]], [], [CODES["drop"]]]
+    assert all_codes.sent == [[CODES["drop"]], [], [CODES["trial.start"]]]
     assert own.sent == [[5], [], []]
     (first, tick), (second, _), (third, later) = notes
     assert (first.name, tick, first.time) == ("trigger.sent", 7, due)
-    assert (first.data["trigger"], first.data["codes"]) == ("all", "30")
+    assert (first.data["trigger"], first.data["codes"]) == ("all", "48")
     assert (second.data["trigger"], second.data["codes"]) == ("own", "5")
-    assert (third.data["codes"], later) == ("48", 9)
+    assert (third.data["codes"], later) == ("30", 9)
     assert 0.0 <= first.data["delay_s"] <= second.data["delay_s"] <= third.data["delay_s"]
     del notes[2]
     came = due + 10.0
-    all_codes.answers = [Echo(48, came), Echo(30, came)]  # that of 30 was lost, and comes no more
+    all_codes.answers = [Echo(30, came), Echo(48, came)]  # that of 48 was lost, and comes no more
     all_codes.fault = "unplugged"
     frame.events = ()
     triggers(frame)
     echo, stray, lost = (event for event, _ in notes[2:])
-    assert echo.data["code"] == 48
+    assert echo.data["code"] == 30
     # From before the code was handed over, which is when its note says at the latest.
     assert came - due - third.data["delay_s"] <= echo.data["delay_s"] <= came - due
     assert stray.data["delay_s"] is None
@@ -393,6 +393,22 @@ def test_an_amplifier_at_500_hz_sees_every_code_of_a_tick(
     assert seen == expected
     assert max(np.abs(times - first).min() for first in firsts) <= 1.0 / 500.0
     assert {event.name for event in notes} == {"trigger.sent"}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_by_default_what_is_shown_or_done_does_not_wait_for_the_frame_of_it(seed: int) -> None:
+    draws = random.Random(seed)
+    frame, line, notes = make_frame(make_run(ch8())), Fixed(), []
+    line.codes = None
+    triggers = Triggers({"box": line}, lambda event, tick: notes.append(event), notes.append)
+    done = draws.choice(["targets.shown", "target.entered", "command.onset", "drop"])
+    names = [done, "session.start", "step.start", "block.start", "trial.start", "trial.end"]
+    draws.shuffle(names)
+    frame.events = tuple(Event(name, frame.tick.due) for name in names)
+    triggers(frame)
+    assert line.sent == [[CODES[done]]]
+    assert {name: CODES[name] for name in PULSES} == dict(PULSES)
+    assert set(PULSES) | set(LEARNT_LATE) == set(CODES)
 
 
 def test_codes_that_a_line_cannot_show_in_time_are_told_as_not_sent() -> None:
