@@ -20,7 +20,6 @@ WORDS = {
     "body": "body hit",
     "overload_max": "overloads, max direction",
     "overload_min": "overloads, min direction",
-    "drop": "drops",
 }
 
 
@@ -86,7 +85,8 @@ class Assessment:
         return [
             self._heading(running=running),
             _time(time, reference),
-            *(f"{WORDS[name]}: {n} of {settings.mistakes}" for name, n in whole.items()),
+            *(f"{WORDS[name]}: {whole[name]} of {settings.mistakes}" for name in COUNTS),
+            *(f"drops: {whole[name]}, outside the indicator" for name in whole.keys() - COUNTS),
             self._points(time, whole, reference, settings, running=running),
         ]
 
@@ -127,7 +127,7 @@ class Assessment:
         outcome = "success" if self._row is None else str(self._row["outcome"])
         completed, why = completion(
             {"completion": self._flag, "outcome": outcome},
-            max(counts.values()),
+            max(counts[name] for name in COUNTS),
             settings,
             overruled=self._overruled,
             overruled_after=self._overruled_after,

@@ -47,9 +47,12 @@ KINDS = {
     "body": "contacts with the body beyond the allowed force",
     "overload_max": "times that a joint was overloaded in its positive direction",
     "overload_min": "times that a joint was overloaded in its negative direction",
-    "drop": "times that something slipped out of the jaws or was let go from too high",
+    "drop": "times that something slipped out of the jaws and fell, or was let go from too high",
 }
 """Mistakes of these kinds are counted, each for itself; what counts as one."""
+
+ENDING = tuple(kind for kind in KINDS if kind != "drop")
+"""Of these, too many end a run: those that the paper counts. Others are reported beside them."""
 
 
 @dataclass

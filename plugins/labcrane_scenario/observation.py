@@ -12,6 +12,12 @@ from labcrane_scenario.settings import ScenarioSettings
 SETTLE_S = 0.5
 """Somebody is placed a little above the ground, and lies when this time has passed, in seconds."""
 
+SUPPORTED_M = 0.02
+"""What slipped and fell by no more than this was set down or stood on something, in metres."""
+
+GRIP = ("height", "loose", "slipped", "left")
+"""What the state says of a thing that leaves the jaws."""
+
 
 @dataclass(frozen=True, slots=True)
 class Watched:
@@ -81,13 +87,13 @@ class Observation:
         self._overload = run.state.find("joint.overload")
         self._names = run.machine.names
         self._over = [0] * len(self._names)
-        columns = run.state.columns
-        self._drops_at = columns.index("grip.drops") if "grip.drops" in columns else None
-        self._drops = 0.0
+        self._grip = (
+            {word: run.state.index(f"grip.{word}") for word in GRIP}
+            if "grip.left" in run.state.columns
+            else {}
+        )
         self._drop_m = settings.drop_m
-        self._held_at = columns.index("grip.thing") if "grip.height" in columns else None
-        self._height_at = columns.index("grip.height") if "grip.height" in columns else None
-        self._held, self._height = 0, 0.0
+        self._left, self._loose = 0.0, 0
         moving = [each.name.split(".")[1] for each in run.state.signals if _says_support(each.name)]
         self._moving = ("", *moving)
 
@@ -105,21 +111,30 @@ class Observation:
         yield from self._overloads(state, due)
         yield from self._dropped(state, due)
 
+    def end(self, state: FloatArray, due: float) -> Iterator[Event]:
+        """Yield the drop of what still leaves the jaws in the trial's last tick."""
+        if self._loose:
+            yield from self._fallen(state, due)
+
     def _dropped(self, state: FloatArray, due: float) -> Iterator[Event]:
-        """Yield what slipped out of the jaws, or was let go above the largest height."""
-        slipped = self._drops_at is not None and state.item(self._drops_at) > self._drops
-        if slipped and self._drops_at is not None:
-            self._drops = state.item(self._drops_at)
-        held = 0 if self._held_at is None else int(state.item(self._held_at))
-        let_go = self._held > 0 and held != self._held
-        if slipped or (let_go and self._height > self._drop_m):
-            about: dict[str, Value] = {"count": self.mistakes.add("drop")}
-            if let_go:
-                about |= {"thing": self._moving[self._held], "height": self._height}
-            yield Event("drop", due, {**about, "slipped": slipped})
-        self._held = held
-        if self._height_at is not None:
-            self._height = state.item(self._height_at)
+        """Yield what has left the jaws and fell too far."""
+        if not self._grip:
+            return
+        left = state.item(self._grip["left"])
+        if left > self._left:
+            yield from self._fallen(state, due)
+        self._left, self._loose = left, int(state.item(self._grip["loose"]))
+
+    def _fallen(self, state: FloatArray, due: float) -> Iterator[Event]:
+        height = state.item(self._grip["height"])
+        slipped = state.item(self._grip["slipped"]) > 0.0
+        if height > (SUPPORTED_M if slipped else self._drop_m):
+            about: dict[str, Value] = {
+                "thing": self._moving[self._loose],
+                "height": height,
+                "slipped": slipped,
+            }
+            yield Event("drop", due, {"count": self.mistakes.add("drop"), **about})
 
     def _contacts(self, state: FloatArray, due: float) -> Iterator[Event]:
         lies = self._settling == 0

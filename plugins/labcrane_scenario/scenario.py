@@ -10,7 +10,7 @@ from labcrane import FloatArray, Frame, Machine, ProtocolError, Run, Signal, Tas
 from labcrane.core import Event, Phase, PlannedTrial, TrialStatus, Value
 from labcrane.machines import SCENE_PLACED, Scene, load_scene, place_objects, write_placed
 from labcrane_scenario.goals import GoalSequence, check_goals
-from labcrane_scenario.mistakes import KINDS
+from labcrane_scenario.mistakes import ENDING, KINDS
 from labcrane_scenario.observation import Observation
 from labcrane_scenario.settings import ScenarioSettings
 
@@ -137,8 +137,8 @@ class Scenario(Task):
         if frame.elapsed == 0.0:
             events.insert(0, Event(SCENE_PLACED, due, {"things": self._placed}))
         events.extend(self._way.see(state, due))
-        mistakes = self._watch.mistakes
-        kind = next((name for name, count in mistakes.counts.items() if count > self._most), None)
+        counts = self._watch.mistakes.counts
+        kind = next((name for name in ENDING if counts[name] > self._most), None)
         phase = Phase.RUNNING
         if self._way.done:
             phase = Phase.SUCCESS
@@ -147,7 +147,9 @@ class Scenario(Task):
             events.append(Event("mistakes.too_many", due, {"kind": kind, "most": self._most}))
         elif frame.elapsed >= self._limit:
             phase = Phase.TIMEOUT
-        self._values[:] = (*self._way.target(state), self._away(state), *mistakes.counts.values())
+        if phase.over:
+            events.extend(self._watch.end(state, due))
+        self._values[:] = (*self._way.target(state), self._away(state), *counts.values())
         results = self._results(frame, phase) if phase.over else {}
         return TrialStatus(phase, self._values, tuple(events), results)
 

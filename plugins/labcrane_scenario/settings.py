@@ -23,7 +23,8 @@ class ScenarioSettings(Settings):
 
     mistakes: PositiveInt = 4
     """More mistakes than this of one kind end the run, with a completion flag of 0, unless the
-    supervisor overrides it."""
+    supervisor overrides it. Drops are counted beside them and end nothing: the paper's indicator
+    has none."""
 
     limit_s: Annotated[PositiveFloat | None, Usual(5.0, 4 * 3600.0)] = None
     """Time after which a run ends, in seconds; each scene's own by default."""
@@ -35,8 +36,9 @@ class ScenarioSettings(Settings):
     """... for this time, in seconds. Until then it is one mistake."""
 
     drop_m: Annotated[NonNegativeFloat, Usual(0.001, 5.0)] = 0.15
-    """Letting go of something that is higher than this above what is under it is a drop, like
-    something that slips out, in metres. Of somebody it is the limb in the jaws that counts."""
+    """Something that is let go and falls by more than this is a drop, once it has left the jaws, in
+    metres; what slips out of them is one where nothing supports it. Of somebody it is the limb in
+    the jaws that counts."""
 
     find_axis: ButtonName | None = None
     """Button with which the operator reports a deformity, while the tip is near it; none by

@@ -106,16 +106,26 @@ def test_a_grip_forms_carries_and_is_let_go(tmp_path: Path) -> None:
         assert lifted[-1][state.index("grip.force")] == pytest.approx(3 * 9.81, rel=0.3)
         let_go = step(arm, 3.0, jaws=150)
         assert let_go[-1][held] == 0.0
-        assert let_go[-1][state.index("grip.drops")] == 0.0
+        assert let_go[-1][state.index("grip.left")] == 1.0
+        assert let_go[-1][state.index("grip.slipped")] == 0.0
         assert let_go[-1][height] < 0.2
 
 
 @pytest.mark.slow
-def test_a_grip_breaks_above_the_slip_force_and_that_is_a_drop(tmp_path: Path) -> None:
+def test_a_grip_breaks_above_the_slip_force_once_however_hard_the_jaws_still_press(
+    tmp_path: Path,
+) -> None:
     with standing(GRASP.format(slip=20), tmp_path) as (arm, state):
         grasp(arm)
-        dropped = step(arm, 2.0, arm=-120)
-        assert dropped[-1][state.index("grip.drops")] >= 1.0
+        states = step(arm, 2.0, arm=-120, jaws=-150)
+        held, loose, slipped, left = (
+            states[:, state.index(f"grip.{word}")] for word in ("thing", "loose", "slipped", "left")
+        )
+        assert (np.diff(held) != 0.0).sum() == 1  # it is let go of, and never taken again
+        assert slipped[-1] == 1.0
+        assert loose[-1] == 1.0 - left[-1]
+        step(arm, 3.0, jaws=150)
+        assert arm.state()[state.index("grip.left")] == 1.0
 
 
 @pytest.mark.slow
@@ -130,6 +140,7 @@ def test_letting_go_high_up_is_a_drop_and_setting_down_is_none(
         grasp(arm)
         list(watch.see(arm.state(), 0.0))
         states = [*step(arm, lift_s, arm=-120), *step(arm, 2.0), *step(arm, 3.0, jaws=150)]
+        states.extend(step(arm, 1.0, arm=-120))
         events = [event for values in states for event in watch.see(values, 0.0)]
     found = [event for event in events if event.name == "drop"]
     held = [values for values in states if values[state.index("grip.thing")]]

@@ -80,7 +80,6 @@ def judged(tmp_path: Path, pushes: list[float], *, lift_limits: bool = False):
         Signal("scene.block.position", "m", ("x", "y", "z")),
         Signal("scene.block.force", "N", ("block",)),
         Signal("scene.block.support", "N"),
-        Signal("grip.drops", "1"),
     )
     run = make_run(ch8(), state=state, task=task.signals)
     task.open(run)

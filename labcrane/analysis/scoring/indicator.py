@@ -36,7 +36,7 @@ class Performance:
     completed
         The completion factor k.
     drop
-        How often something fell: it has no points of its own, and counts for k.
+        How often something fell: reported beside the indicator, which has no part for it.
     """
 
     duration_s: float

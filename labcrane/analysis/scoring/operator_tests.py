@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 DROPS = "n_drop"
-"""Drops; a test without this column has none, and they have no points of their own."""
+"""Drops; reported beside what the indicator counts; a test without this column has none."""
 
 DETECTION = ("deformity", "found", "false_reports")
 """What was reported of deformities, where a test has these columns."""
@@ -197,7 +197,7 @@ def _test(
     drops = 0 if math.isnan(found := float(row.get(DROPS, 0))) else int(found)
     completed, why = completion(
         row,
-        max(*counts.values(), drops),
+        max(counts.values()),
         settings,
         overruled=_overruled(session, row),
         overruled_after=_overruled(session, row, after=True),

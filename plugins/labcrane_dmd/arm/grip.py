@@ -1,6 +1,7 @@
 """The grip of the jaws on a thing."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from labcrane_dmd.arm.contacts import LINK_B, Contacts, ContactWindow, Key
@@ -12,6 +13,9 @@ BELOW_M = 20.0
 
 BODY, POINT = 0, 3
 """Places of the body and of the point in what the engine says of a ray."""
+
+NEAR_M = 0.01
+"""A thing has left the jaws when neither of them is nearer to it than this, in metres."""
 
 RAYS, PAST_M = 16, 0.005
 """How often a ray that met the arm or what is held goes on, and how far under it, in metres."""
@@ -34,8 +38,27 @@ class Held:
     squeeze: float = 0.0
 
 
+@dataclass
+class Loose:
+    """A thing that is no longer in the grip and has not yet left the jaws.
+
+    Where it was when it was highest: its lowest height, and that above the hand, in m.
+    """
+
+    standing: StandingBody
+    link: int
+    lowest: float = -math.inf
+    beside: float = 0.0
+
+
 class Grip:
-    """Forms when both jaws press on a thing, breaks when it is pulled out or let go.
+    """Forms when both jaws press on a thing, and breaks when it is pulled out or let go.
+
+    What has slipped is gripped again only after the jaws were opened, and nothing else while it is
+    still at them. An episode begins with a grip
+    and ends when the thing has left the jaws: ``left`` counts those that have ended, ``slipped``
+    says whether what came loose last did so by itself, and ``height`` how far what is held could
+    fall, or what came loose last fell past the jaws and could still fall when they lost it, in m.
 
     Parameters
     ----------
@@ -44,7 +67,7 @@ class Grip:
     press
         Force of each jaw, in N, above which a grip forms.
     release
-        Opening of the jaws, in rad, that lets go.
+        Opening of the jaws, in rad, that lets go, and after which they can grip again.
     ticks
         Length of the window of the force.
     """
@@ -54,10 +77,13 @@ class Grip:
     ) -> None:
         self._arm, self._jaws, self._client = arm, jaws, client
         self._press, self._release, self._ticks = press, release, ticks
+        self._shut: float | None = None
         self.held: Held | None = None
+        self.loose: Loose | None = None
         self.force = 0.0
         self.height = 0.0
-        self.drops = 0
+        self.slipped = False
+        self.left = 0
 
     def tighten(self, force: float) -> None:
         """Press on what is held with so much more, in N."""
@@ -74,23 +100,64 @@ class Grip:
 
     def look(self, contacts: Contacts, things: list[StandingBody], opening: float) -> None:
         """Form, keep or break the grip after a tick; ``opening`` is the jaws' angle in rad."""
-        if self.held is None:
-            for each in things:
+        if self.held is not None:
+            self._pull(self.held, opening)
+            return
+        if self._can_grip(opening):
+            for each in things if self.loose is None else [self.loose.standing]:
                 pressed = [contacts.by_link.get((each.placed.name, jaw), 0.0) for jaw in self._jaws]
                 if each.placed.kind != "obstacle" and min(pressed) > self._press:
                     self._take(each, opening)
                     return
-            return
-        pulled = pybullet.getConstraintState(self.held.constraint, physicsClientId=self._client)
-        self.height = self._height(self.held)
-        self.force = self.held.pull.add(sum(part * part for part in pulled[:3]) ** 0.5)
-        if self.force > self.held.standing.placed.slip:
-            self.drops += 1
-            self._let_go()
-        elif opening > self.held.opening + self._release:
-            self._let_go()
+        if self.loose is not None:
+            self._follow(self.loose)
+
+    def _can_grip(self, opening: float) -> bool:
+        """Whether the jaws were opened since something slipped out of them."""
+        if self._shut is None:
+            return True
+        self._shut = min(self._shut, opening)
+        if opening > self._shut + self._release:
+            self._shut = None
+        return self._shut is None
+
+    def _pull(self, held: Held, opening: float) -> None:
+        pulled = pybullet.getConstraintState(held.constraint, physicsClientId=self._client)
+        self.height = self._height(held.standing, held.link)
+        self.force = held.pull.add(sum(part * part for part in pulled[:3]) ** 0.5)
+        slipped = self.force > held.standing.placed.slip
+        if slipped or opening > held.opening + self._release:
+            self._shut = opening if slipped else None
+            self._let_go(held, slipped=slipped)
+
+    def _follow(self, loose: Loose) -> None:
+        """Measure how far what is loose falls past the jaws, until it has left them.
+
+        What is lowered in them, or stands still while they are raised, does not fall.
+        """
+        lowest = min(low[2] for low, _ in self._boxes(loose.standing, loose.link))
+        hand = pybullet.getLinkState(self._arm, self._jaws[1], physicsClientId=self._client)
+        beside = lowest - hand[0][2]
+        if lowest > loose.lowest:
+            loose.lowest, loose.beside = lowest, beside
+        fell = max(0.0, min(loose.lowest - lowest, loose.beside - beside))
+        self.height = fell + self._height(loose.standing, loose.link)
+        if not any(self._near(loose, jaw) for jaw in self._jaws):
+            self.left += 1
+            self.loose = None
+
+    def _near(self, loose: Loose, jaw: int) -> bool:
+        body, client = loose.standing.body, self._client
+        # Of somebody it is the limb that was held; the others may touch the arm wherever they lie.
+        limb = {"linkIndexB": loose.link} if loose.standing.placed.jointed else {}
+        return bool(
+            pybullet.getClosestPoints(
+                self._arm, body, NEAR_M, linkIndexA=jaw, **limb, physicsClientId=client
+            )
+        )
 
     def _take(self, each: StandingBody, opening: float) -> None:
+        self.loose = None
         touched = self._touched(each)
         limb = each.placed.kind == "body"
         constraint = self._hold_limb(each, touched) if limb else self._hold(each)
@@ -99,18 +166,22 @@ class Grip:
         self.held = Held(
             each, constraint, each.parts[touched], touched, opening, ContactWindow(self._ticks)
         )
-        self.force, self.height = 0.0, self._height(self.held)
+        self.force, self.height = 0.0, self._height(each, touched)
 
-    def _height(self, held: Held) -> float:
-        """Return how far what is held could fall, in m: of somebody, the limb in the jaws.
+    def _boxes(self, standing: StandingBody, link: int) -> list[tuple[Sequence[float], ...]]:
+        """Return the boxes around a thing's parts; of somebody, around the limb in the jaws."""
+        links = [link] if standing.placed.jointed else list(standing.parts)
+        client = self._client
+        return [pybullet.getAABB(standing.body, each, physicsClientId=client) for each in links]
+
+    def _height(self, standing: StandingBody, link: int) -> float:
+        """Return how far a thing could fall, in m: of somebody, the limb in the jaws.
 
         That is from its lowest height straight down to the first thing that is neither the arm nor
         what is held, under its middle.
         """
-        body, client = held.standing.body, self._client
-        limb = held.standing.placed.jointed
-        links = [held.link] if limb else list(held.standing.parts)
-        boxes = [pybullet.getAABB(body, link, physicsClientId=client) for link in links]
+        body, client = standing.body, self._client
+        boxes = self._boxes(standing, link)
         lowest = min(low[2] for low, _ in boxes)
         x, y = (
             0.5 * (min(low[axis] for low, _ in boxes) + max(high[axis] for _, high in boxes))
@@ -179,12 +250,11 @@ class Grip:
         )
         return constraint
 
-    def _let_go(self) -> None:
-        if self.held is None:
-            return
-        pybullet.removeConstraint(self.held.constraint, physicsClientId=self._client)
-        self._collide(self.held.standing, touch=True)
-        self.held, self.force, self.height = None, 0.0, 0.0
+    def _let_go(self, held: Held, *, slipped: bool) -> None:
+        pybullet.removeConstraint(held.constraint, physicsClientId=self._client)
+        self._collide(held.standing, touch=True)
+        self.loose = Loose(held.standing, held.link)
+        self.held, self.force, self.slipped = None, 0.0, slipped
 
     def _collide(self, each: StandingBody, *, touch: bool) -> None:
         for jaw in self._jaws:

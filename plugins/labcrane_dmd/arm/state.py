@@ -39,9 +39,10 @@ Parts = Mapping[str, Felt]
 LIMIT_RAD = 1e-3
 """A joint this close to the end of its range stands there."""
 
-GRIP = (("thing", "1"), ("force", "N"), ("drops", "1"), ("height", "m"))
-"""Which thing is held, counted from 1 in the order of the state, what pulls at it, how often
-something slipped out, and how high what the jaws have hold of is above what is under it."""
+GRIP = {"thing": "1", "force": "N", "height": "m", "loose": "1", "slipped": "1", "left": "1"}
+"""Which thing is held, counted from 1 in the order of the state; what pulls at it; how far it could
+fall, or, once loose, fell past the jaws and could still fall; which thing is loose: no longer held
+and still at the jaws; whether what came loose last slipped; how many things held have left."""
 
 
 NOWHERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -87,7 +88,7 @@ def arm_signals(machine: Machine, parts: Parts, links: tuple[str, ...]) -> tuple
     scene = [signal for name, felt in parts.items() for signal in _thing_signals(name, felt)]
     if not all(felt.moves for felt in parts.values()):
         scene.append(Signal("contact.fixed", "N", links))
-    grip = [Signal(f"grip.{word}", unit) for word, unit in GRIP] if parts else []
+    grip = [Signal(f"grip.{word}", unit) for word, unit in GRIP.items()] if parts else []
     return (
         Signal("joint.angle", "rad", machine.names),
         Signal("joint.velocity", "rad/s", machine.names),
@@ -205,9 +206,14 @@ class ArmState:
             values += [fixed.get(number, 0.0) for number in range(len(self._links))]
         grip = world.grip
         if grip is None:
-            return [*values, 0.0, 0.0, 0.0, 0.0]
-        held = self._order[grip.held.standing.placed.name] if grip.held else 0
-        return [*values, float(held), grip.force, float(grip.drops), grip.height]
+            return [*values, *(0.0 for _ in GRIP)]
+        numbers = [
+            float(self._order[each.standing.placed.name]) if each else 0.0
+            for each in (grip.held, grip.loose)
+        ]
+        held, loose = numbers
+        counted = [float(grip.slipped), float(grip.left)]
+        return [*values, held, grip.force, grip.height, loose, *counted]
 
 
 def _absent(felt: Felt) -> list[float]:
