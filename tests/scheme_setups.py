@@ -31,7 +31,7 @@ def joint_velocity(**changes: object) -> JointVelocitySettings:
 
 
 def end_effector(**changes: object) -> EndEffectorSettings:
-    return EndEffectorSettings.model_validate({"map": BASE} | changes)
+    return EndEffectorSettings.model_validate({"map": BASE, "speed_m_s": 0.5} | changes)
 
 
 def switchable(**changes: object) -> SwitchableSettings:
@@ -39,7 +39,7 @@ def switchable(**changes: object) -> SwitchableSettings:
         {
             "button": "right.trigger",
             "joint_velocity": {"map": JOINTS},
-            "end_effector": {"map": BASE},
+            "end_effector": {"map": BASE, "speed_m_s": 0.5},
         }
         | changes
     )

@@ -110,6 +110,15 @@ class Controller(Component):
         would need more pushes as far as it goes, in the same direction.
         """
 
+    def attainable(self, places: Sequence[Sphere]) -> Mapping[str, float]:
+        """Return the tip's speed in m/s that each of its schemes allows at places, by name.
+
+        The median over places and directions, asked for before ``open``. ``labcrane check`` asks
+        where they differ, of a component whose settings say that it provides more than one
+        ``scheme``.
+        """
+        return {}
+
 
 class Dynamics(Component):
     """The machine being operated."""

@@ -12,6 +12,7 @@ from typing import Any
 from labcrane.analysis.presented import operators_views
 from labcrane.analysis.scoring.settings import COUNTS, RATINGS, TIME
 from labcrane.core.references import Reference, mentioned
+from labcrane.core.roles import Controller
 from labcrane.errors import LabcraneError, ProtocolError, suggestion
 from labcrane.files.pseudonyms import pseudonyms
 from labcrane.files.system import is_there
@@ -32,6 +33,9 @@ LONGEST_BREAK_S = 3600.0
 LONGEST_LATENCY_S = 2.0
 LONGEST_SESSION_S = 4 * 3600.0
 """Of a visit that does not say how long it may take."""
+
+ALIKE = 1.2
+"""How many times as fast as another a scheme may be before a comparison is of speeds."""
 
 FASTEST_HZ = 1000.0
 SLOWEST_HZ = 20.0
@@ -168,6 +172,7 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_slow_views(study)
     yield from _of_what_is_shared(study)
     yield from _of_buttons(study)
+    yield from _of_schemes(study)
     yield from _of_monitors(study)
     yield from _of_the_machine(study)
     yield from _of_silent_blocks(study)
@@ -417,6 +422,24 @@ def _of_buttons(study: Study) -> Doubts:
                         f"{part} goes by {button!r}, and so does {key_of(taken[button])} of the "
                         "scheme: one press does both",
                     )
+
+
+def _of_schemes(study: Study) -> Doubts:
+    """Question schemes of one study with which the tip cannot be moved alike fast."""
+    if len(study.scheme.settings.provides(study.machine).get("scheme", ())) < 2:  # noqa: PLR2004
+        return  # most studies have one, and nothing need be built
+    scheme = study.scheme.build(study.machine)
+    assert isinstance(scheme, Controller)  # noqa: S101 - the registry filed it under its role
+    places = [place for task in study.tasks.values() for place in task.places()]
+    speeds = scheme.attainable(places)
+    if speeds and max(speeds.values()) > ALIKE * min(speeds.values()):
+        said = ", ".join(f"{speed:.2f} m/s with {name}" for name, speed in speeds.items())
+        yield (
+            ("scheme",),
+            f"the tip attains {said} at the study's targets (median over targets and directions), "
+            "so that a comparison of the schemes finds their speeds; what is not given is worked "
+            "out so that they are alike",
+        )
 
 
 def _of_monitors(study: Study) -> Doubts:

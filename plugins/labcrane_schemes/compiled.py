@@ -1,6 +1,6 @@
 """Compiled schemes: the same arithmetic as the classes beside it, operation by operation.
 
-What a scheme knows lies in one array: three numbers of the scheme, then one block for each law.
+What a scheme knows lies in one array: numbers of the scheme, then one block for each law.
 """
 
 import math
@@ -10,11 +10,12 @@ import numpy as np
 from labcrane import FloatArray
 from labcrane.core import Places, compiled, twin
 
-ACTIVE, DOWN, SWITCHES, BUTTON, BUTTON_SIGN, FIRST, SECOND = range(7)
-"""Of the scheme: which law is active, whether the button is down, whether there is one and where;
-where the blocks begin."""
-CHANGING = 2
-HEAD = 7
+ACTIVE, DOWN, SHARE, SWITCHES, BUTTON, BUTTON_SIGN, FIRST, SECOND, STEP = range(9)
+"""Of the scheme: which law is active, whether the button is down, the second law's share of the
+command, whether there is a button and where; where the blocks begin, and by how much the share
+changes in a tick."""
+CHANGING = 3
+HEAD = 9
 
 (
     RESOLVED, JOINTS, STICKS, EDGE, REST, LINEAR, EXPO, STRETCH, STEEPNESS, STRAIGHT, WIDTH, HOLDS,
@@ -274,6 +275,17 @@ def command(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) 
             own[ACTIVE] = 1.0 - own[ACTIVE]
         own[DOWN] = 1.0 if down else 0.0
         out[len(out) - 1] = own[ACTIVE]
+        step = own[STEP] if own[ACTIVE] != 0.0 else -own[STEP]
+        share = min(1.0, max(0.0, own[SHARE] + step))
+        own[SHARE] = share
+        if share not in (0.0, 1.0):
+            angles, size = seen[places[twin.STATE] :], len(out) - 1
+            other = np.empty(size)
+            _command(own, int(own[FIRST]), axes, angles, other)
+            _command(own, int(own[SECOND]), axes, angles, out)
+            for k in range(size):
+                out[k] = (1.0 - share) * other[k] + share * out[k]
+            return twin.MADE
     _command(own, _block(own), axes, seen[places[twin.STATE] :], out)
     return twin.MADE
 

@@ -1,12 +1,14 @@
 """End-effector-velocity control: each axis moves the tip along one direction."""
 
 import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from labcrane import Controller, FloatArray, Machine, ProtocolError, Run
-from labcrane.core import Twin
+from labcrane.core import Sphere, Twin, Value
 from labcrane.machines import Arm
+from labcrane_schemes.attainable import attainable
 from labcrane_schemes.axis_map import Axis, find_axes
 from labcrane_schemes.law import law, twin_numbers
 from labcrane_schemes.resolved_rate import ResolvedRate
@@ -20,9 +22,15 @@ FEWEST_TO_HOLD_PITCH = 4
 
 
 class EndEffector(Controller):
-    """Moves the tip in a straight line wherever the sticks point."""
+    """Moves the tip in a straight line wherever the sticks point.
 
-    def __init__(self, settings: EndEffectorSettings, machine: Machine) -> None:
+    Parameters
+    ----------
+    share
+        Of the speed that the joints allow, where the settings name none.
+    """
+
+    def __init__(self, settings: EndEffectorSettings, machine: Machine, share: float = 1.0) -> None:
         if settings.redundancy == "hold_pitch" and len(machine.joints) < FEWEST_TO_HOLD_PITCH:
             raise ProtocolError(
                 f"redundancy 'hold_pitch' needs {FEWEST_TO_HOLD_PITCH} joints, but the machine has "
@@ -30,7 +38,8 @@ class EndEffector(Controller):
             )
         self.signals = scheme_signals(machine)
         self._settings = settings
-        self._speed = settings.speed_m_s
+        self._share = share
+        self._speed = settings.speed_m_s or math.nan  # known when the targets are
         self._base = settings.frame == "base"
         self._machine = machine
         self._arm = Arm(machine)
@@ -53,6 +62,19 @@ class EndEffector(Controller):
         self._axes = find_axes(run.axes, directions, self._settings.map)
         self._n_axes = run.axes.size
         self._angle = run.state.find("joint.angle")
+        self._speed = self._full_speed(run.places)
+
+    def _full_speed(self, places: Sequence[Sphere]) -> float:
+        """Return the tip speed in m/s of a full push of one axis, to the mm/s."""
+        given = self._settings.speed_m_s
+        return given or round(self._share * attainable(self._machine, self._rate, places), 3)
+
+    def metadata(self) -> Mapping[str, Value]:
+        return {"speed_m_s": self._speed}
+
+    def attainable(self, places: Sequence[Sphere]) -> Mapping[str, float]:
+        speed = attainable(self._machine, self._rate, places, self._full_speed(places))
+        return {"end_effector": speed}
 
     def command(self, axes: FloatArray, state: FloatArray) -> FloatArray:
         pushes, angles, out = axes.tolist(), state[self._angle].tolist(), self._out

@@ -1,12 +1,14 @@
 """Joint-velocity control: each axis turns one joint."""
 
+from collections.abc import Mapping, Sequence
 from functools import partial
 from struct import Struct
 
 import numpy as np
 
 from labcrane import Controller, FloatArray, Machine, Run
-from labcrane.core import Twin
+from labcrane.core import Sphere, Twin
+from labcrane_schemes.attainable import attainable
 from labcrane_schemes.axis_map import Axis, check_joints, find_axes
 from labcrane_schemes.law import law, twin_numbers
 from labcrane_schemes.resolved_rate import NOTHING, ResolvedRate
@@ -42,6 +44,9 @@ class JointVelocity(Controller):
         )
         self._hands = np.zeros(run.axes.size)
         self._angle = run.state.find("joint.angle")
+
+    def attainable(self, places: Sequence[Sphere]) -> Mapping[str, float]:
+        return {"joint_velocity": attainable(self._machine, self._rate, places)}
 
     def command(self, axes: FloatArray, state: FloatArray) -> FloatArray:
         pushes, angles = axes.tolist(), state[self._angle].tolist()

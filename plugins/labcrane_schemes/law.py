@@ -51,8 +51,8 @@ def law(
 
 def twin_numbers(first: FloatArray, second: FloatArray | None = None) -> FloatArray:
     """Return what the twin of a scheme knows: of one law, or of two and a button."""
-    from labcrane_schemes.compiled import HEAD  # noqa: PLC0415 - loads numba
+    from labcrane_schemes.compiled import FIRST, HEAD, SECOND  # noqa: PLC0415 - loads numba
 
     head = np.zeros(HEAD)
-    head[5], head[6] = HEAD, HEAD + len(first)
+    head[FIRST], head[SECOND] = HEAD, HEAD + len(first)
     return np.concatenate([head, first] if second is None else [head, first, second])

@@ -3,10 +3,21 @@
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationInfo, model_validator
 
 from labcrane import Machine, Settings
-from labcrane.core import AxisName, ButtonName, Covers, JointName, Names, Once, Reference, Unit
+from labcrane.core import (
+    AxisName,
+    ButtonName,
+    Covers,
+    JointName,
+    Names,
+    Once,
+    Reference,
+    Unit,
+    Usual,
+    was_run,
+)
 
 DIRECTIONS = {"base": ("x", "y", "z"), "arm": ("radial", "tangential", "vertical")}
 """What the stick moves the tip along, for each ``frame``."""
@@ -15,6 +26,8 @@ DIRECTIONS = {"base": ("x", "y", "z"), "arm": ("radial", "tangential", "vertical
 Direction = Annotated[str, Reference("direction of the frame", own=True)]
 """A direction in which the tip is moved."""
 
+
+FORMER_M_S = 0.5
 
 LARGEST_DEAD_ZONE = 0.5
 
@@ -67,8 +80,10 @@ class EndEffectorSettings(HandlingSettings):
     frame: Literal["base", "arm"] = "base"
     """Whether the directions stay with the base or turn with the arm."""
 
-    speed_m_s: PositiveFloat = 0.5
-    """Tip speed at full deflection of one axis, in m/s."""
+    speed_m_s: PositiveFloat | None = None
+    """Tip speed at full deflection of one axis, in m/s. By default what the machine's joints
+    allow at the study's targets (the median over targets and directions: along the arm, across it
+    and up), so that schemes can be compared."""
 
     redundancy: Literal["minimum_norm", "hold_pitch"] = "minimum_norm"
     """How the joints that are one too many are settled: by the smallest joint speeds, which
@@ -83,6 +98,14 @@ class EndEffectorSettings(HandlingSettings):
 
     def provides(self, machine: Machine) -> Names:
         return {"direction of the frame": DIRECTIONS[self.frame]}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _former(cls, written: object, info: ValidationInfo) -> object:
+        # What was recorded without a speed moved by a former default.
+        if was_run(info) and isinstance(written, Mapping):
+            return {"speed_m_s": FORMER_M_S, **written}
+        return written
 
 
 class SwitchableSettings(Settings):
@@ -99,6 +122,20 @@ class SwitchableSettings(Settings):
 
     start: Literal["joint_velocity", "end_effector"] = "joint_velocity"
     """The scheme in which every trial begins."""
+
+    ramp_s: Annotated[NonNegativeFloat, Usual(0.01, 5.0)] = 0.5
+    """Time over which a change goes from one scheme's command to the other's, in seconds."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _former(cls, written: object, info: ValidationInfo) -> object:
+        # What was recorded without a ramp changed at once.
+        if was_run(info) and isinstance(written, Mapping):
+            return {"ramp_s": 0.0, **written}
+        return written
+
+    def provides(self, machine: Machine) -> Names:
+        return {"scheme": ("joint_velocity", "end_effector")}
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
         either = {"joint_velocity": self.joint_velocity, "end_effector": self.end_effector}

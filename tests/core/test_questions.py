@@ -49,6 +49,15 @@ BALL = "feedback: {ball: {use: sphere}, tone: {use: sphere}}\nsessions:"
 SEEN = f"views: {{front: {{use: view}}}}\n{BALL}"
 GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
 
+MAP = "map: {slew: -left.x, elbow: left.y, wrist: -right.x, shoulder: -right.y}"
+UNLIKE = [
+    (
+        f"use: joint_velocity\n  {MAP}",
+        f"use: switchable\n  button: left.trigger\n  joint_velocity: {{{MAP}}}\n"
+        "  end_effector: {speed_m_s: 0.5, map: {x: left.y, y: -left.x, z: right.y}}",
+    )
+]
+
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
@@ -177,6 +186,7 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
         ([("sessions:", "streams: {g: {name: Neon Gaze}}\nsessions:")], "streams.g.space", "does not say what its pixels are of"),
         ([("sessions:", "streams: {g: {name: G, type: Gaze}}\nsessions:")], "streams.g.space", "write space: screen"),
         ([("sessions:", "streams: {g: {name: G, space: screen}, h: {name: H, space: screen}}\nsessions:")], "streams.h.space", "g and h are all places"),
+        (UNLIKE, "scheme", "m/s with joint_velocity, 0.50 m/s with end_effector at the study's targets"),
         ([("sessions:", "streams: {eeg: {type: EEG}, gaze: {name: Neon}}\nsessions:")],
          "streams.eeg", "each run asks which one is meant; give the source_id"),
     ],
@@ -191,6 +201,12 @@ def test_a_number_that_nobody_means_is_asked_about_until_it_is_answered(
     assert asked[key].endswith("is that meant?")
     answer = ("sessions:", f"expected: [{', '.join(asked)}]\nsessions:")
     assert questions(a_study(tmp_path, *changes, answer)) == ()
+
+
+def test_schemes_that_are_alike_fast_by_default_are_not_asked_about(tmp_path: Path) -> None:
+    ((old, new),) = UNLIKE
+    changes = (old, new.replace("speed_m_s: 0.5, ", ""))
+    assert "scheme" not in {each.key for each in questions(a_study(tmp_path, changes))}
 
 
 RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"

@@ -19,6 +19,7 @@ from scheme_setups import (
 from labcrane import Controller, ProtocolError, Settings
 from labcrane.machines import jacobian
 from labcrane.testing import (
+    RATE_HZ,
     ControllerContract,
     ch8,
     crane_at,
@@ -206,8 +207,10 @@ def test_each_scheme_commands_what_it_commands_alone() -> None:
     state = crane_at(machine, LOW["ch8"].tolist())
     hands = push(left_x=0.4, left_y=-0.7, right_y=0.2)
     np.testing.assert_array_equal(scheme.command(hands, state)[:-1], joint.command(hands, state))
-    hands[-1] = 1.0
     scheme.command(push(), state)
+    hands[-1] = 1.0
+    for _ in range(round(RATE_HZ)):  # longer than a change takes
+        scheme.command(hands, state)
     np.testing.assert_array_equal(scheme.command(hands, state)[:-1], tip.command(hands, state))
 
 
