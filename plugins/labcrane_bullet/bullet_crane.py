@@ -19,6 +19,9 @@ with 400 (ch8, 240 Hz)."""
 RESIDUAL = 0.0
 """All passes are made: with any threshold, joints go further through their limits."""
 
+TORQUE = 3
+"""Place of a motor's torque in what the engine says of a joint."""
+
 LIMIT_FORCE = 1e7
 """In N m. The engine's own is 24 kN m at 240 Hz, through which a crane's drives push any joint; the
 URDF's effort is not used for it (bullet3 #2944)."""
@@ -123,10 +126,13 @@ class BulletCrane(Crane):
         self._read = partial(pybullet.getJointStates, body, self._joints, physicsClientId=client)
 
     def _move(self, speeds: Sequence[float]) -> FloatArray:
-        dt, before = self._dt, self._speeds
-        change = [(speed - was) / dt for speed, was in zip(speeds, before, strict=True)]
-        torques = self._torques(self._angles, before, change)
-        if self._suffice(torques):
+        self._push_to(speeds)
+        return self._state.fill(self._angles, self._speeds)
+
+    def _push_to(self, speeds: Sequence[float]) -> Sequence[float]:
+        """Make a tick at ``speeds`` in rad/s; return the drives' torques in N m."""
+        torques = self._enough(speeds)
+        if torques is not None:
             if self._motors_on:
                 self._let_go()
                 self._motors_on = False
@@ -138,15 +144,20 @@ class BulletCrane(Crane):
         states = self._read()
         self._angles = [state[0] for state in states]
         self._speeds = [state[1] for state in states]
-        return self._state.fill(self._angles, self._speeds)
+        return torques or [state[TORQUE] for state in states]
 
-    def _suffice(self, torques: Sequence[float]) -> bool:
-        """Say whether the motors can give these torques, and no joint is beyond its limits."""
-        angles = self._angles
+    def _enough(self, speeds: Sequence[float]) -> Sequence[float] | None:
+        """Return the torques that give joints these speeds; None where the solver is needed.
+
+        That is where a motor has not the torque, or a joint is beyond its limits.
+        """
+        dt, before, angles = self._dt, self._speeds, self._angles
+        change = [(speed - was) / dt for speed, was in zip(speeds, before, strict=True)]
+        torques: Sequence[float] = self._torques(angles, before, change)
         for joint, lowest, highest, effort in self._bounds:
             if not (lowest <= angles[joint] <= highest and -effort <= torques[joint] <= effort):
-                return False
-        return True
+                return None
+        return torques
 
     def _disconnect(self) -> None:
         if self._client is not None:

@@ -38,16 +38,14 @@ class LoadedBulletCrane(LoadedCrane, BulletCrane):
             )
             pybullet.resetJointState(self._body, hinge, angle, 0.0, physicsClientId=self._client)
 
+    def _enough(self, speeds: Sequence[float]) -> Sequence[float] | None:
+        # Inverse dynamics know no joints without drives: a grapple's ticks are the solver's.
+        return super()._enough(speeds) if self._loaded.grapple is None else None
+
     def _move(self, speeds: Sequence[float]) -> FloatArray:
-        # Inverse dynamics know no joints without drives: every tick is the solver's.
-        self._solve(targetVelocities=speeds)
-        self._step()
-        states = self._read()
-        crane = self._state.fill([state[0] for state in states], [state[1] for state in states])
-        loads = [
-            state[3] / joint.effort
-            for state, joint in zip(states, self._machine.joints, strict=True)
-        ]
+        torques = self._push_to(speeds)
+        crane = self._state.fill(self._angles, self._speeds)
+        loads = [torque / effort for torque, effort in zip(torques, self._efforts, strict=True)]
         if self._loaded.grapple is None:
             return self._load.fill(crane, loads)
         hinges = pybullet.getJointStates(self._body, self._hinges, physicsClientId=self._client)

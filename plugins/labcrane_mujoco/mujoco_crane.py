@@ -11,15 +11,16 @@ import numpy as np
 from labcrane import FloatArray, Machine, Run
 from labcrane.core import Crane, CraneSettings, Value
 from labcrane.machines import GRAVITY, urdf_of
-from labcrane_mujoco.end_stops import stop_forces
+from labcrane_mujoco.limited_drives import limited_torques
 
 
 class MujocoCrane(Crane):
     """Drives that give each joint its speed at the end of the tick, up to its effort.
 
     The engine's mass matrix and bias forces say which torques that takes, as in
-    docs/decisions/0090-torques-before-passes.md; a larger torque than a drive has is cut off, and
-    the joint takes more ticks. The engine's own velocity servos cannot hold a crane at 240 Hz.
+    docs/decisions/0090-torques-before-passes.md. Where a drive has not the torque, those of all
+    joints are solved for together, so that only its own joint and what hangs on it are slower. The
+    engine's own velocity servos cannot hold a crane at 240 Hz.
 
     No joint is asked to go beyond its limit. One that its drive cannot stop in time is stopped by
     an end stop of ours: the engine's own limits are soft, and let a joint through by 0.3 degrees.
@@ -92,28 +93,38 @@ class MujocoCrane(Crane):
         self._want(*accelerations)
         self._multiply()
         self._add()
-        wanted = self._torques()
-        torques = [
-            effort if torque > effort else -effort if torque < -effort else torque
-            for torque, effort in zip(wanted, self._efforts, strict=False)
-        ]
-        self._apply(*torques)
-        if torques != wanted[: self._joints]:  # otherwise each joint goes where it was asked to
-            self._stop()
+        torques = self._torques()
+        enough = all(
+            -effort <= torque <= effort
+            for torque, effort in zip(torques, self._efforts, strict=False)
+        )
+        if enough:
+            self._apply(*torques[: self._joints])
+        else:
+            torques = self._limited(accelerations)
         self._integrate()
         self._begin()
-        return torques
+        return torques[: self._joints]
 
-    def _stop(self) -> None:
-        """Add what the end stops push with when the drives alone do not stop a joint in time."""
+    def _limited(self, accelerations: Sequence[float]) -> list[float]:
+        """Apply what limited drives and the end stops push with; return the drives' in N m."""
         model, data = self._model, self._data
         mujoco.mj_fullM(model, data, self._mass)
         # The engine's Euler step takes damping implicitly.
         np.einsum("ii->i", self._mass)[:] += self._dt * model.dof_damping
-        force = data.qfrc_applied + data.qfrc_passive - data.qfrc_bias
-        data.qfrc_applied[: self._joints] += stop_forces(
-            self._mass, force, self._angles, self._speeds, self._limits, self._dt
+        drives, stops = limited_torques(
+            self._mass,
+            data.qfrc_passive - data.qfrc_bias,
+            self._angles,
+            self._speeds,
+            [was + self._dt * by for was, by in zip(self._speeds, accelerations, strict=False)],
+            self._efforts,
+            self._limits,
+            self._dt,
         )
+        self._apply(*(drives + stops))
+        torques: list[float] = drives.tolist()
+        return torques
 
     def _torques(self) -> list[float]:
         """Return in N m what gives the joints the accelerations wanted."""

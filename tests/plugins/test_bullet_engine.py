@@ -3,7 +3,7 @@
 import hashlib
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -263,14 +263,15 @@ def test_torques_worked_out_before_the_step_change_its_time_only(
     if share < 1.0:
         commands = random_sticks(machine, rate_hz, 3.0)
     paths, passes = [], []
-    suffice = BulletCrane._suffice
+    enough = BulletCrane._enough
 
-    def count(crane: BulletCrane, torques: list[float]) -> bool:
-        passes.append(suffice(crane, torques))
-        return passes[-1]
+    def count(crane: BulletCrane, speeds: list[float]) -> Sequence[float] | None:
+        torques = enough(crane, speeds)
+        passes.append(torques is not None)
+        return torques
 
-    for decide in (count, lambda crane, torques: False):
-        monkeypatch.setattr(BulletCrane, "_suffice", decide)
+    for decide in (count, lambda crane, speeds: None):
+        monkeypatch.setattr(BulletCrane, "_enough", decide)
         with standing("bullet_crane", machine, rate_hz) as crane:
             paths.append(drive(crane, commands, rate_hz))
     assert all(passes) == (share < 1.0), "either kind of tick is tried"
@@ -285,13 +286,14 @@ def test_a_simulated_operator_who_aims_asks_no_motor_for_too_much(
     """Every tick that did would cost the solver's time (docs/decisions/0108)."""
     from labcrane_bullet.bullet_crane import BulletCrane
 
-    suffice, enough = BulletCrane._suffice, []
+    work_out, enough = BulletCrane._enough, []
 
-    def count(crane: BulletCrane, torques: list[float]) -> bool:
-        enough.append(suffice(crane, torques))
-        return enough[-1]
+    def count(crane: BulletCrane, speeds: list[float]) -> Sequence[float] | None:
+        torques = work_out(crane, speeds)
+        enough.append(torques is not None)
+        return torques
 
-    monkeypatch.setattr(BulletCrane, "_suffice", count)
+    monkeypatch.setattr(BulletCrane, "_enough", count)
     rehearse(a_study(tmp_path, SHORT.replace("kinematic_crane", "bullet_crane")))
     assert len(enough) > 1000
     assert all(enough)
