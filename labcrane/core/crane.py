@@ -31,6 +31,18 @@ def crane_signals(machine: Machine) -> tuple[Signal, ...]:
     )
 
 
+def drive_signals(machine: Machine) -> tuple[Signal, ...]:
+    """Return what the state of a crane with drives of limited torque holds besides.
+
+    ``joint.load`` is the drive's torque as a share of the joint's effort, with its sign;
+    ``joint.saturated`` is 1 or -1 where it gives all that it has, by its direction, and else 0.
+    """
+    return (
+        Signal("joint.load", "1", machine.names),
+        Signal("joint.saturated", "1", machine.names),
+    )
+
+
 class Crane(Dynamics):
     """A crane whose joints follow speed commands through their actuators.
 
@@ -45,11 +57,15 @@ class Crane(Dynamics):
         Its joints, limits and links.
     """
 
+    has_drives = False
+    """Whether its joints have drives of limited torque, whose load its state holds."""
+
     def __init__(self, settings: CraneSettings, machine: Machine) -> None:
-        self.signals = crane_signals(machine)
+        drives = drive_signals(machine) if self.has_drives else ()
+        self.signals = (*crane_signals(machine), *drives)
         self._settings = settings
         self._machine = machine
-        self._state = CraneState(machine)
+        self._state = CraneState(machine, drives=self.has_drives)
 
     def open(self, run: Run) -> None:
         self._drive = run.command.find("command")

@@ -24,8 +24,7 @@ STILL = (0.0, 0.0)
 class HangingLoad:
     """A payload, or a grapple on two hinges that nothing drives, and a state that has it.
 
-    ``joint.load`` is the drive's torque as a share of the joint's effort, with its sign. Swings
-    count from hanging straight down: ``along`` outward, ``across`` to the left.
+    Swings count from hanging straight down: ``along`` outward, ``across`` to the left.
 
     Parameters
     ----------
@@ -50,7 +49,7 @@ class HangingLoad:
         self._machine = machine
         self._settings = settings
         self._grapple = settings.grapple
-        self.signals: tuple[Signal, ...] = (*bare, Signal("joint.load", "1", machine.names))
+        self.signals: tuple[Signal, ...] = tuple(bare)
         if self._grapple:
             self.signals += (
                 Signal("grapple.swing", "rad", WAYS),
@@ -100,7 +99,6 @@ class HangingLoad:
     def fill(
         self,
         crane: FloatArray,
-        loads: Sequence[float],
         hinges: Sequence[float] | None = None,
         rates: Sequence[float] = STILL,
     ) -> FloatArray:
@@ -109,9 +107,7 @@ class HangingLoad:
         Parameters
         ----------
         crane
-            The state without the load, shape ``(2 * n_joints + 6,)``.
-        loads
-            Every drive's torque as a share of its effort.
+            The state without the load, shape ``(n_crane,)``.
         hinges
             Angles of the grapple's hinges, in rad; by default those at which it hangs still.
         rates
@@ -121,7 +117,6 @@ class HangingLoad:
         joints = len(self._machine.joints)
         angles, speeds = values[:joints], values[joints : 2 * joints]
         tip = values[2 * joints : 2 * joints + 3]
-        values += loads
         if self._grapple:
             swing, rate = STILL, STILL
             if hinges is not None:
@@ -134,7 +129,7 @@ class HangingLoad:
 
 
 class LoadedCrane(Crane):
-    """A crane's state with the load of every joint, and where the grapple is.
+    """A crane's state with what hangs from its tip, and where the grapple is.
 
     An engine's crane becomes one with a load by this class before its own:
     ``class LoadedBulletCrane(LoadedCrane, BulletCrane)``. It fills the state by ``self._load``.
@@ -151,7 +146,7 @@ class LoadedCrane(Crane):
 
     def reset(self, pose: Sequence[float]) -> None:
         super().reset(pose)
-        self._load.fill(self._state.values, [0.0] * len(self._machine.joints))
+        self._load.fill(self._state.values)
 
     def bodies(self) -> Sequence[Body]:
         return (*super().bodies(), *self._load.bodies())

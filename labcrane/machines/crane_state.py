@@ -21,17 +21,29 @@ class CraneState(Arm):
     Attributes
     ----------
     values
-        The state, shape ``(2 * n_joints + 6,)``.
+        The state, shape ``(2 * n_joints + 6,)``; of a crane with drives ``(4 * n_joints + 6,)``.
     """
 
-    def __init__(self, machine: Machine) -> None:
+    def __init__(self, machine: Machine, *, drives: bool = False) -> None:
         super().__init__(machine)
-        self.values: FloatArray = np.zeros(2 * len(machine.joints) + 6)
+        joints = len(machine.joints)
+        self._idle = (0.0,) * joints if drives else ()
+        self.values: FloatArray = np.zeros(2 * joints + 6 + 2 * len(self._idle))
         # Packing numbers into an array costs half of assigning them.
         self._put = partial(Struct(f"{len(self.values)}d").pack_into, self.values.data, 0)
 
-    def fill(self, angles: Sequence[float], speeds: Sequence[float]) -> FloatArray:
-        """Return the state with joints at ``angles`` in rad, moving at ``speeds`` in rad/s."""
+    def fill(
+        self,
+        angles: Sequence[float],
+        speeds: Sequence[float],
+        loads: Sequence[float] | None = None,
+        saturated: Sequence[float] | None = None,
+    ) -> FloatArray:
+        """Return the state with joints at ``angles`` in rad, moving at ``speeds`` in rad/s.
+
+        Of a crane with drives, ``loads`` are their torques as shares of the joints' efforts, and
+        ``saturated`` where a drive gives all it has, 1 or -1 by its direction; 0 by default.
+        """
         pitch, turning = 0.0, 0.0
         radius, height, outward, upward = self._foot, self._height, 0.0, 0.0
         for joint, length, offset in self._links:
@@ -54,5 +66,7 @@ class CraneState(Arm):
             outward * ahead - sideways * left,
             outward * left + sideways * ahead,
             upward,
+            *(loads or self._idle),
+            *(saturated or self._idle),
         )
         return self.values

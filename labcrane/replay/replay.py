@@ -6,7 +6,7 @@ it took effect. Nothing else changes a state, so the same versions give the
 same numbers, bit for bit.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -159,6 +159,7 @@ def _run(
         clock = ManualClock(start=script.start)
         with suppress(RecordOver):
             loop.run(rig, run, sequencer, clock, script, log, (*sinks, *shown))
+    parts = (*parts, *log.unrecorded(record))
     return Replayed(log.ticks, parts, log.compare(record), log.frames())
 
 
@@ -195,6 +196,12 @@ class _Log(FrameLog):
             for group in dict.fromkeys(column.group for column in self._columns)
         }
 
+    def unrecorded(self, record: SessionRecord) -> Iterator[str]:
+        """Yield, in words, the columns that the recording has not: they cannot be compared."""
+        for column in self._columns:
+            if column.label not in record.streams[column.group].data:
+                yield f"{column.group}.{column.label}: not recorded, now there"
+
     def compare(self, record: SessionRecord) -> Difference | None:
         """Return the first number that differs; NaN equals NaN, 0 does not equal -0."""
         first: Difference | None = None
@@ -204,7 +211,7 @@ class _Log(FrameLog):
             name = f"{column.group}.{column.label}"
             table = record.streams[column.group].data
             if column.label not in table:
-                return Difference(0, name, np.nan, float(self._rows[0, number]))
+                continue  # said by unrecorded
             recorded = table[column.label].to_numpy(np.float64)[: self.ticks]
             replayed = np.ascontiguousarray(self._rows[: self.ticks, number])
             same = recorded.view(np.int64) == replayed.view(np.int64)

@@ -22,6 +22,9 @@ RESIDUAL = 0.0
 TORQUE = 3
 """Place of a motor's torque in what the engine says of a joint."""
 
+ALL = 1.0 - 1e-9
+"""Share of its torque at which a motor gives all that it has; the solver rounds."""
+
 LIMIT_FORCE = 1e7
 """In N m. The engine's own is 24 kN m at 240 Hz, through which a crane's drives push any joint; the
 URDF's effort is not used for it (bullet3 #2944)."""
@@ -41,6 +44,9 @@ class BulletCrane(Crane):
     Every reset starts the engine anew: setting joints by hand leaves contact and solver caches
     behind, and the same commands would then not give the same bits.
     """
+
+    has_drives = True
+    _passes = ITERATIONS
 
     def __init__(self, settings: CraneSettings, machine: Machine) -> None:
         super().__init__(settings, machine)
@@ -96,7 +102,7 @@ class BulletCrane(Crane):
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=self._dt,
             numSubSteps=0,
-            numSolverIterations=ITERATIONS,
+            numSolverIterations=self._passes,
             solverResidualThreshold=RESIDUAL,
             deterministicOverlappingPairs=1,
             physicsClientId=client,
@@ -126,11 +132,6 @@ class BulletCrane(Crane):
         self._read = partial(pybullet.getJointStates, body, self._joints, physicsClientId=client)
 
     def _move(self, speeds: Sequence[float]) -> FloatArray:
-        self._push_to(speeds)
-        return self._state.fill(self._angles, self._speeds)
-
-    def _push_to(self, speeds: Sequence[float]) -> Sequence[float]:
-        """Make a tick at ``speeds`` in rad/s; return the drives' torques in N m."""
         torques = self._enough(speeds)
         if torques is not None:
             if self._motors_on:
@@ -144,7 +145,15 @@ class BulletCrane(Crane):
         states = self._read()
         self._angles = [state[0] for state in states]
         self._speeds = [state[1] for state in states]
-        return torques or [state[TORQUE] for state in states]
+        if torques is not None:
+            return self._state.fill(self._angles, self._speeds, self._loads(torques))
+        loads = self._loads([state[TORQUE] for state in states])
+        saturated = [float(load >= ALL) - float(load <= -ALL) for load in loads]
+        return self._state.fill(self._angles, self._speeds, loads, saturated)
+
+    def _loads(self, torques: Sequence[float]) -> list[float]:
+        """Return torques in N m as shares of the joints' efforts."""
+        return [torque / effort for torque, effort in zip(torques, self._efforts, strict=True)]
 
     def _enough(self, speeds: Sequence[float]) -> Sequence[float] | None:
         """Return the torques that give joints these speeds; None where the solver is needed.

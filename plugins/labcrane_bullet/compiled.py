@@ -97,9 +97,11 @@ ENOUGH = 0.999
 
 @compiled.part
 def torques_suffice(
-    own: FloatArray, angles: FloatArray, speeds: FloatArray, asked: FloatArray
+    own: FloatArray, angles: FloatArray, speeds: FloatArray, asked: FloatArray, loads: FloatArray
 ) -> bool:
     """Whether motors can change the joints' speeds to what is asked for within a tick.
+
+    Fill their loads, if they can.
 
     Newton's and Euler's equations in the vertical plane that turns with the slew.
     """
@@ -137,9 +139,11 @@ def torques_suffice(
     for k in range(n - 1, 0, -1):
         moments, pushes, lifts = moments + moment[k], pushes + push[k], lifts + lift[k]
         about_joint = moments - joint_z[k] * pushes + joint_r[k] * lifts
-        if abs(about_joint) > ENOUGH * own[link + EFFORT * n + k]:
+        loads[k] = about_joint / own[link + EFFORT * n + k]
+        if abs(loads[k]) > ENOUGH:
             return False
-    return bool(abs(about_slew) <= ENOUGH * own[link + EFFORT * n])
+    loads[0] = about_slew / own[link + EFFORT * n]
+    return bool(abs(loads[0]) <= ENOUGH)
 
 
 @compiled.tick
@@ -150,7 +154,8 @@ def step_engine(own: FloatArray, places: Places, seen: FloatArray, row: FloatArr
     angles, speeds = row[state : state + n], row[state + n : state + 2 * n]
     follow(own, at, row[drive : drive + n], speeds)
     before, was = own[at : at + n], own[at + n : at + 2 * n]
-    if not torques_suffice(own, before, was, speeds):
+    loads = row[state + 2 * n + 6 : state + 3 * n + 6]
+    if not torques_suffice(own, before, was, speeds, loads):
         return twin.DECLINED
     low, high = TABLES + n, TABLES + 2 * n
     for j in range(n):
@@ -158,6 +163,7 @@ def step_engine(own: FloatArray, places: Places, seen: FloatArray, row: FloatArr
         if not own[low + j] + NEAR < angle < own[high + j] - NEAR:
             return twin.DECLINED
         angles[j] = angle
+    row[state + 3 * n + 6 : state + 4 * n + 6] = 0.0  # no motor gives all it has
     own[at : at + n], own[at + n : at + 2 * n] = angles, speeds
     put_tip(own, angles, speeds, row[state + 2 * n : state + 2 * n + 6])
     return twin.MADE

@@ -11,15 +11,12 @@ from labcrane_mujoco.mujoco_crane import MujocoCrane
 
 
 class LoadedMujocoCrane(LoadedCrane, MujocoCrane):
-    """The engine's crane with the load of every joint, and where the grapple is."""
+    """The engine's crane with what hangs from its tip."""
 
     def _move(self, speeds: Sequence[float]) -> FloatArray:
         joints = self._joints
-        torques = self._push(speeds)
-        angles, turning = self._angles, self._speeds
-        crane = self._state.fill(angles[:joints], turning[:joints])
-        loads = [torque / effort for torque, effort in zip(torques, self._efforts, strict=True)]
-        return self._load.fill(crane, loads, angles[joints:] or None, turning[joints:])
+        crane = self._state.fill(*self._push(speeds))
+        return self._load.fill(crane, self._angles[joints:] or None, self._speeds[joints:])
 
 
 class GrappleCrane(LoadedMujocoCrane):

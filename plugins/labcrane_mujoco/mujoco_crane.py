@@ -26,6 +26,8 @@ class MujocoCrane(Crane):
     an end stop of ours: the engine's own limits are soft, and let a joint through by 0.3 degrees.
     """
 
+    has_drives = True
+
     def __init__(self, settings: CraneSettings, machine: Machine) -> None:
         super().__init__(settings, machine)
         self._joints = len(machine.joints)
@@ -76,11 +78,19 @@ class MujocoCrane(Crane):
         self._speeds: list[float] = self._velocities.tolist()
 
     def _move(self, speeds: Sequence[float]) -> FloatArray:
-        self._push(speeds)
-        return self._state.fill(self._angles, self._speeds)
+        return self._state.fill(*self._push(speeds))
 
-    def _push(self, speeds: Sequence[float]) -> list[float]:
-        """Make a tick at ``speeds`` in rad/s; return the torques in N m."""
+    def _push(
+        self, speeds: Sequence[float]
+    ) -> tuple[list[float], list[float], list[float], list[float] | None]:
+        """Make a tick at ``speeds`` in rad/s.
+
+        Returns
+        -------
+        tuple
+            Angles in rad and speeds in rad/s of the joints, their drives' torques as shares of the
+            efforts, and where they give all they have; None for nowhere.
+        """
         dt = self._dt
         accelerations = [
             (speed - was) / dt
@@ -94,20 +104,20 @@ class MujocoCrane(Crane):
         self._multiply()
         self._add()
         torques = self._torques()
-        enough = all(
-            -effort <= torque <= effort
-            for torque, effort in zip(torques, self._efforts, strict=False)
-        )
-        if enough:
+        loads = [torque / effort for torque, effort in zip(torques, self._efforts, strict=False)]
+        saturated = None
+        if max(loads) <= 1.0 and min(loads) >= -1.0:
             self._apply(*torques[: self._joints])
         else:
-            torques = self._limited(accelerations)
+            loads = self._limited(accelerations)
+            saturated = [float(load == 1.0) - float(load == -1.0) for load in loads]
         self._integrate()
         self._begin()
-        return torques[: self._joints]
+        joints = self._joints
+        return self._angles[:joints], self._speeds[:joints], loads, saturated
 
     def _limited(self, accelerations: Sequence[float]) -> list[float]:
-        """Apply what limited drives and the end stops push with; return the drives' in N m."""
+        """Apply what limited drives and the end stops push with; return the drives' loads."""
         model, data = self._model, self._data
         mujoco.mj_fullM(model, data, self._mass)
         # The engine's Euler step takes damping implicitly.
@@ -123,8 +133,8 @@ class MujocoCrane(Crane):
             self._dt,
         )
         self._apply(*(drives + stops))
-        torques: list[float] = drives.tolist()
-        return torques
+        loads: list[float] = (drives / self._efforts).tolist()
+        return loads
 
     def _torques(self) -> list[float]:
         """Return in N m what gives the joints the accelerations wanted."""

@@ -97,7 +97,7 @@ def test_an_engine_follows_the_velocity_law(
         with standing(each, machine, rate_hz, actuator) as crane:
             paths.append(drive(crane, commands, rate_hz))
     assert np.ptp(paths[1][:, :4], axis=0).min() > np.radians(1), "every joint moves"
-    np.testing.assert_allclose(paths[0], paths[1], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(paths[0][:, :14], paths[1], rtol=0, atol=1e-9)
 
 
 @needs_bullet
@@ -131,7 +131,7 @@ def test_only_the_efforts_part_an_engine_from_the_law(name: str, rate_hz: float)
             with standing(each, model, rate_hz) as crane:
                 crane.reset([0.0] * 4)
                 paths.append(drive(crane, commands, rate_hz))
-        gaps[model is machine] = np.abs(paths[0] - paths[1])[:, :4].max()
+        gaps[model is machine] = np.abs(paths[0][:, :4] - paths[1][:, :4]).max()
     assert gaps[False] < 1e-6
     assert 1e-4 < gaps[True] < np.radians(2.0), "real motors take time to turn the arm round"
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from needs import needs
 from rehearsal import a_study
@@ -11,7 +12,7 @@ import labcrane
 from labcrane import Frame, ProtocolError, RecordingError
 from labcrane.analysis.measures import measure_session
 from labcrane.cli.app import main
-from labcrane.recording.participant_file.reader import open_recording
+from labcrane.recording.participant_file.reader import Stream, open_recording
 from labcrane.replay import replay_session
 from labcrane.session.commands import Command, Order, StreamBack, StreamLost
 from results.recorded import STUDY, record, study
@@ -91,6 +92,25 @@ def test_another_version_is_named(path: Path, monkeypatch: pytest.MonkeyPatch) -
     again = replay_session(path, 1)
     assert again.parts == (f"numpy: recorded with {np.__version__}, now 0.0.9",)
     assert again.difference is None
+
+
+def test_what_was_not_recorded_then_is_named_and_all_else_is_compared(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the loads of joints, which recordings of before have not."""
+    whole = Stream.data.func
+
+    def former(stream: Stream) -> pd.DataFrame:
+        table = whole(stream)
+        return table.drop(columns=[name for name in table if name.startswith("tip.velocity.")])
+
+    monkeypatch.setattr(Stream, "data", property(former))
+    again = replay_session(path, 1)
+    assert again.difference is None
+    assert again.parts == tuple(
+        f"state.tip.velocity.{axis}: not recorded, now there" for axis in "xyz"
+    )
+    assert replay_session(path, 1, machine=changed_machine(path.parent)).difference is not None
 
 
 def test_orders_are_given_again_at_their_ticks(tmp_path: Path) -> None:
