@@ -53,7 +53,8 @@ def restored_study(
     path = restore(record, folder, protocol, machine, run_code=run_code)
     code = own_code(record) if protocol is None else {}
     try:
-        return load(path, discover(study=path if run_code else protocol), recorded=True)
+        plugins = discover(study=path if run_code else protocol)
+        return load(path, plugins, recorded=protocol is None)
     except ProtocolError as error:
         if not code or run_code:
             raise
@@ -90,6 +91,7 @@ def restore(
         content["machine"] = "machine.yaml"
         if protocol is None:
             _put_in_questionnaires(content, record)
+            _put_in_defaults(content, record)
             write_files(record.context.get("files", {}), folder)
         (folder / "machine.yaml").write_text(described, encoding="utf-8")
         _write_instructions(content, record, folder)
@@ -145,6 +147,26 @@ def _write_instructions(content: Mapping[str, Any], record: SessionRecord, folde
                 count += 1
                 step["instructions"] = f"instructions-{count}.txt"
                 (folder / step["instructions"]).write_text(text, encoding="utf-8")
+
+
+def _put_in_defaults(content: Mapping[str, Any], record: SessionRecord) -> None:
+    """Let recorded settings stand for those that were not written: defaults may be others by now.
+
+    What a recording does not have either did not exist: plugins know what held in its place.
+    """
+    components = record.context["components"]
+    written = {part: content.get(part) for part in MOVING}
+    written |= {f"tasks.{name}": task for name, task in content.get("tasks", {}).items()}
+    for part, settings in written.items():
+        if isinstance(settings, dict) and (recorded := components.get(part)):
+            _complete(settings, recorded["settings"])
+
+
+def _complete(written: dict[str, Any], recorded: Mapping[str, Any]) -> None:
+    for key, value in recorded.items():
+        now = written.setdefault(key, value)
+        if isinstance(now, dict) and isinstance(value, Mapping) and now is not value:
+            _complete(now, value)
 
 
 def _put_in_questionnaires(content: Mapping[str, Any], record: SessionRecord) -> None:

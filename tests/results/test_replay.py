@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from needs import needs
-from rehearsal import a_study
+from rehearsal import SHORT, a_study
 
 import labcrane
 from labcrane import Frame, ProtocolError, RecordingError
@@ -14,6 +14,7 @@ from labcrane.analysis.measures import measure_session
 from labcrane.cli.app import main
 from labcrane.recording.participant_file.reader import Stream, open_recording
 from labcrane.replay import replay_session
+from labcrane.replay.restore import restored_study
 from labcrane.session.commands import Command, Order, StreamBack, StreamLost
 from results.recorded import STUDY, record, study
 
@@ -92,6 +93,28 @@ def test_another_version_is_named(path: Path, monkeypatch: pytest.MonkeyPatch) -
     again = replay_session(path, 1)
     assert again.parts == (f"numpy: recorded with {np.__version__}, now 0.0.9",)
     assert again.difference is None
+
+
+SWITCHED = (
+    "  use: switchable\n  button: left.trigger\n  start: end_effector\n"
+    "  joint_velocity: {map: {slew: -left.x, elbow: left.y, wrist: -right.x, "
+    "shoulder: -right.y}}\n  end_effector: {map: {x: left.y, y: -left.x, z: right.y}}\n"
+)
+
+
+def test_defaults_are_those_of_the_recording(tmp_path: Path) -> None:
+    """Now that of the study's targets; 0.5 m/s where that is what is recorded."""
+    whole = SHORT[: SHORT.index("scheme:\n") + 8] + SWITCHED + SHORT[SHORT.index("dynamics:") :]
+    path = record(a_study(tmp_path, whole), tmp_path / "data", "P001", simulated=True)
+    again = replay_session(path, 1)
+    assert (again.difference, again.parts) == (None, ())
+    session = open_recording(path).session(1)
+    settings = session.context["components"]["scheme"]["settings"]
+    assert (settings["ramp_s"], settings["end_effector"]["speed_m_s"]) == (0.5, None)
+    settings["end_effector"]["speed_m_s"] = 0.5
+    del settings["ramp_s"]
+    scheme = restored_study(session, tmp_path).scheme.settings.model_dump()
+    assert (scheme["ramp_s"], scheme["end_effector"]["speed_m_s"]) == (0.0, 0.5)
 
 
 def test_what_was_not_recorded_then_is_named_and_all_else_is_compared(
