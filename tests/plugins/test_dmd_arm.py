@@ -22,7 +22,7 @@ from labcrane.testing import (
 from labcrane.testing.commands import CommandContract
 from labcrane_dmd import labcrane_commands
 from labcrane_dmd.arm.overload import Overload
-from labcrane_dmd.arm.settings import OverloadSettings, ValveSettings
+from labcrane_dmd.arm.settings import ArmSettings, OverloadSettings, ValveSettings
 from labcrane_dmd.arm.valve import Valve
 from labcrane_dmd.fit.recordings import read_recordings
 
@@ -138,6 +138,39 @@ def test_a_joint_without_a_law_is_refused() -> None:
         build(proportional=())
 
 
+def test_a_joint_that_was_not_recorded_has_the_valve_of_those_that_were() -> None:
+    """Dead band, dead time and lag are the means of the model's, written here by hand."""
+    ways = [
+        way for each in labcrane_dmd.load(MODEL).values() for way in (each.extend, each.retract)
+    ]
+    time, lag = (np.mean([getattr(way, name) for way in ways]) for name in ("dead_time", "lag"))
+    with standing() as (arm, state):
+        base, full = state.index("joint.velocity.base"), arm._machine.speeds[0]
+        assert not step(arm, 10.0, base=2.5)[:, base].any(), "a stick 1 % off centre"
+        speeds = step(arm, 1.5, base=250)[:, base]
+    since = (np.arange(len(speeds)) + 1 - round(time * RATE_HZ)) / RATE_HZ
+    band = np.mean([way.dead_band for way in ways]) / 250
+    opening = np.maximum(0.0, 1.0 - np.exp(-np.maximum(since, 0.0) / lag))
+    open_enough = opening * (1.0 - band) * 250 > 1.0
+    np.testing.assert_allclose(speeds[open_enough], full * opening[open_enough], atol=1e-6)
+    assert np.diff(speeds).max() < 0.05 * full, "no tick jumps"
+
+
+def test_a_valve_that_is_given_is_taken() -> None:
+    none = {"dead_band": 0.0, "dead_time_s": 0.0, "lag_s": 0.0}
+    with standing(proportional_valve=none) as (arm, state):
+        speeds = step(arm, 0.1, base=125)[:, state.index("joint.velocity.base")]
+        np.testing.assert_allclose(speeds, 0.5 * arm._machine.speeds[0], atol=1e-6)
+
+
+def test_a_record_without_a_valve_of_proportional_joints_had_none() -> None:
+    written = {"model": MODEL, "proportional": ["base"]}
+    found = ArmSettings.model_validate(written, context={"recorded": True, "folder": RETRIEVAL})
+    assert found.proportional_valve is not None
+    assert found.proportional_valve.numbers == (0.0, 0.0, 0.0)
+    assert ArmSettings.model_validate(written).proportional_valve is None
+
+
 def test_a_practised_hand_asks_for_the_speed_that_the_model_gives() -> None:
     machine = load_machine("ied_arm.yaml", RETRIEVAL)
     valve = Valve(ValveSettings(model=MODEL), machine)
@@ -150,7 +183,7 @@ def test_a_practised_hand_asks_for_the_speed_that_the_model_gives() -> None:
     wanted = np.array([0.03, 0.04, -0.05])
     signals = 250 * valve.inverse(wanted, state)
     speeds = [
-        signals[0] / 250 * machine.speeds[0],
+        model.proportional(machine.joints[0]).speed(signals[0], angles[0]),
         model["arm"].speed(signals[1], angles[1]),
         model["boom"].speed(signals[2], angles[2]),
         0.0,

@@ -37,6 +37,7 @@ dynamics:
   use: dmd_arm
   model: arm.dmd.yaml
   proportional: [base]
+  proportional_valve: {dead_band: 0, dead_time_s: 0, lag_s: 0}
   scenes: [scene.yaml]
 tasks: {push: {use: scenario, scenes: [scene.yaml], mistakes: 4}}
 sessions: [{name: only, steps: [{block: {task: push}}]}]

@@ -62,7 +62,7 @@ def shown(folder: Path, random: np.random.Generator, moves: list[Move], **thing:
     """Grip a thing and move it; return drops counted, falls seen, and the states."""
     tall = float(random.uniform(0.16, 0.24))
     about = {
-        "mass": random.uniform(1.0, 6.0),
+        "mass": random.uniform(2.0, 6.0),
         "slip": random.uniform(120.0, 350.0),
         "friction": random.uniform(0.3, 0.9),
         "tall": tall,

@@ -41,6 +41,8 @@ class DmdArm(Dynamics):
         links = link_names(machine, settings.jaws)
         self.signals = arm_signals(machine, self._parts, links)
         self._state = ArmState(machine, self._parts, links)
+        given = settings.proportional_valve
+        self._valve = given.numbers if given else None
         drives(self._model, settings.proportional, machine, 1.0)  # complains before anything opens
         settings.check_jaws(machine)
         self._world: World | None = None
@@ -58,7 +60,9 @@ class DmdArm(Dynamics):
             )
         self._dt = 1.0 / run.rate_hz
         settings = self._settings
-        self._drives = drives(self._model, settings.proportional, self._machine, self._dt)
+        self._drives = drives(
+            self._model, settings.proportional, self._machine, self._dt, self._valve
+        )
         self._overloads = overloads(there, settings.overload, self._dt)
         # Jaws press until they stall: that is their work, and no overload.
         self._press = there - 1 if settings.jaws else -1

@@ -5,9 +5,8 @@ from collections import deque
 from collections.abc import Sequence
 
 from labcrane import Machine, ProtocolError
-from labcrane.machines import Joint
 from labcrane_dmd.model.interpolation import FULL
-from labcrane_dmd.model.model import Model, SegmentModel
+from labcrane_dmd.model.model import Model, SegmentModel, Valve
 
 SHUT = 0.25
 """Opening, in steps of 0.4 %, that is none: a lag never quite gets there."""
@@ -57,33 +56,23 @@ class SegmentDrive:
         return math.copysign(min(size, FULL), opening)
 
 
-class ProportionalDrive:
-    """A joint without a model: speed is proportional to the signal."""
-
-    def __init__(self, joint: Joint) -> None:
-        self._speed = joint.speed
-        self.signal = 0.0
-
-    def reset(self) -> None:
-        """Nothing is remembered."""
-
-    def speed(self, signal: float, angle: float) -> float:
-        """Return the speed in rad/s for a tick with this signal."""
-        self.signal = signal
-        return signal / FULL * self._speed
-
-
 def drives(
-    model: Model, proportional: Sequence[str], machine: Machine, dt: float
-) -> tuple[SegmentDrive | ProportionalDrive, ...]:
+    model: Model,
+    proportional: Sequence[str],
+    machine: Machine,
+    dt: float,
+    valve: Valve | None = None,
+) -> tuple[SegmentDrive, ...]:
     """Return a drive for every joint of the machine.
+
+    Proportional ones have the dead band, dead time and lag of ``valve``, or the model's on average.
 
     Raises
     ------
     ProtocolError
         A joint is neither in the model nor proportional, or is both.
     """
-    found: list[SegmentDrive | ProportionalDrive] = []
+    found: list[SegmentDrive] = []
     for name in proportional:
         if name not in machine.names:
             raise ProtocolError(
@@ -91,7 +80,7 @@ def drives(
             )
     for joint in machine.joints:
         if joint.name in proportional:
-            found.append(ProportionalDrive(joint))
+            found.append(SegmentDrive(model.proportional(joint, valve), dt))
         elif joint.name in model:
             found.append(SegmentDrive(model[joint.name], dt))
         else:

@@ -3,10 +3,19 @@
 from collections.abc import Mapping
 from typing import Annotated
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationInfo, model_validator
 
 from labcrane import Machine, ProtocolError, Settings
-from labcrane.core import AxisName, JointName, Names, Once, StudyPath, Usual, read_yaml
+from labcrane.core import (
+    AxisName,
+    JointName,
+    Names,
+    Once,
+    StudyPath,
+    Usual,
+    read_yaml,
+    was_run,
+)
 
 
 class ValveSettings(Settings):
@@ -65,6 +74,24 @@ class OverloadSettings(Settings):
     """How long the load must stay below for it to end, in seconds."""
 
 
+class ProportionalValveSettings(Settings):
+    """The valve of joints that the model does not describe."""
+
+    dead_band: float = Field(ge=0.0, lt=250.0)
+    """Size of the signal up to which the joint stands still, in steps of 0.4 % of full flow."""
+
+    dead_time_s: Annotated[NonNegativeFloat, Usual(0.001, 5.0)]
+    """Time before a signal has any effect, in seconds."""
+
+    lag_s: Annotated[NonNegativeFloat, Usual(0.001, 5.0)]
+    """Time constant with which the valve opens, in seconds."""
+
+    @property
+    def numbers(self) -> tuple[float, float, float]:
+        """Dead band in signals, dead time and lag in s."""
+        return self.dead_band, self.dead_time_s, self.lag_s
+
+
 class ArmSettings(Settings):
     """An arm that moves by a Dynamic Model Description."""
 
@@ -72,8 +99,11 @@ class ArmSettings(Settings):
     """The model's YAML file, made with ``labcrane dmd fit``."""
 
     proportional: Annotated[tuple[JointName, ...], Once()] = ()
-    """Joints that the model does not describe and whose speed is proportional to the signal, up
-    to the machine's joint speed. Every joint is either here or in the model."""
+    """Joints that the model does not describe and whose speed is proportional to the signal beyond
+    the dead band, up to the machine's joint speed. Every joint is either here or in the model."""
+
+    proportional_valve: ProportionalValveSettings | None = None
+    """Dead band, dead time and lag of these joints; by default the means of the model's joints."""
 
     scenes: tuple[StudyPath, ...] = ()
     """Scene files whose objects, figures and obstacles the arm can touch. The trial's condition
@@ -87,6 +117,15 @@ class ArmSettings(Settings):
 
     window_s: PositiveFloat = 0.05
     """Force is the contact impulse over this time divided by it, and load its mean, in seconds."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _former(cls, written: object, info: ValidationInfo) -> object:
+        # What was recorded without this key had no valve there.
+        if was_run(info) and isinstance(written, Mapping):
+            none = {"dead_band": 0.0, "dead_time_s": 0.0, "lag_s": 0.0}
+            return {"proportional_valve": none, **written}
+        return written
 
     def provides(self, machine: Machine) -> Names:
         from labcrane.machines import load_scene  # noqa: PLC0415 - loads numpy

@@ -44,7 +44,15 @@ class Valve(Controller):
         self._machine = machine
         self._arm = Arm(machine)
         self._speeds = np.array(machine.speeds)
-        self._model = _model(settings)
+        self._model = model = _model(settings)
+        self._segments = (
+            [
+                model[joint.name] if joint.name in model else model.proportional(joint)
+                for joint in machine.joints
+            ]
+            if model
+            else []
+        )
         self._out = np.zeros(2 * len(machine.names))
 
     def open(self, run: Run) -> None:
@@ -100,12 +108,12 @@ class Valve(Controller):
 
     def _share(self, joint: int, speed: float, angle: float) -> float:
         """Return the share of full signal for a joint speed; beyond 1 when that is not enough."""
-        name, full = self._machine.names[joint], self._machine.speeds[joint]
-        if self._model is None or name not in self._model:
+        full = self._machine.speeds[joint]
+        if self._model is None:
             return speed / full
         if abs(speed) < STILL:
             return 0.0
-        segment, sign = self._model[name], 1.0 if speed > 0.0 else -1.0
+        segment, sign = self._segments[joint], 1.0 if speed > 0.0 else -1.0
         low, high = segment.direction(speed).dead_band, FULL
         fastest = abs(segment.speed(sign * FULL, angle))
         if fastest <= abs(speed):

@@ -2,10 +2,15 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from statistics import mean
 
 from labcrane import ProtocolError
+from labcrane.machines import Joint
 from labcrane_dmd.model.interpolation import FULL, Layer, is_signal, linear, pchip
 from labcrane_dmd.model.settings import Between, FitSettings
+
+Valve = tuple[float, float, float]
+"""Dead band in signals, dead time and lag in s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +156,29 @@ class Model(Mapping[str, SegmentModel]):
 
     def __len__(self) -> int:
         return len(self.segments)
+
+    def proportional(self, joint: Joint, valve: Valve | None = None) -> SegmentModel:
+        """Return a segment whose speed beyond the dead band is proportional to the signal.
+
+        Parameters
+        ----------
+        joint
+            It moves at its full speed at full flow, in both directions, at any angle.
+        valve
+            Dead band in signals, dead time and lag in s; by default the means of the model's own.
+        """
+        band, time, lag = valve or self._mean_valve()
+
+        def direction(sign: float) -> Direction:
+            full = Layer(sign * FULL, joint.limits, True, (sign * joint.speed,))  # noqa: FBT003
+            return Direction(band, time, lag, (full,))
+
+        return SegmentModel(joint.name, joint.limits, direction(1.0), direction(-1.0), "linear")
+
+    def _mean_valve(self) -> Valve:
+        each = [way for segment in self.values() for way in (segment.extend, segment.retract)]
+        bands, times, lags = zip(*((w.dead_band, w.dead_time, w.lag) for w in each), strict=True)
+        return mean(bands), mean(times), mean(lags)
 
     def interpolated(self, between: Between) -> "Model":
         """Return the same layers with another rule between them."""
