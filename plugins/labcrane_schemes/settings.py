@@ -80,7 +80,7 @@ class EndEffectorSettings(HandlingSettings):
     frame: Literal["base", "arm"] = "base"
     """Whether the directions stay with the base or turn with the arm."""
 
-    speed_m_s: PositiveFloat | None = None
+    speed_m_s: Annotated[PositiveFloat | None, Usual(0.02, 5.0)] = None
     """Tip speed at full deflection of one axis, in m/s. By default what the machine's joints
     allow at the study's targets (the median over targets and directions: along the arm, across it
     and up), so that schemes can be compared."""

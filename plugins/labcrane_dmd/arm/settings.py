@@ -77,7 +77,7 @@ class OverloadSettings(Settings):
 class ProportionalValveSettings(Settings):
     """The valve of joints that the model does not describe."""
 
-    dead_band: float = Field(ge=0.0, lt=250.0)
+    dead_band: Annotated[float, Usual(0.5, 100.0)] = Field(ge=0.0, lt=250.0)
     """Size of the signal up to which the joint stands still, in steps of 0.4 % of full flow."""
 
     dead_time_s: Annotated[NonNegativeFloat, Usual(0.001, 5.0)]
