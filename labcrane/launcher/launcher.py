@@ -111,7 +111,8 @@ class Launcher:
                     ahead = outlook(visit, admission)
                 self._say(ahead.text)
                 now = time.perf_counter()
-                self._console.report(Event("session.standing", now, {"done": ahead.done}))
+                standing = {"done": ahead.done, **ahead.unjudged}
+                self._console.report(Event("session.standing", now, standing))
             else:
                 claim(visit)
             return self._run_all(admission)

@@ -22,12 +22,13 @@ from labcrane.design.plan import (
     SessionPlan,
     next_attempt,
 )
+from labcrane.design.practice import WarmUp
 from labcrane.design.tracks import LEVEL, PlannedTrack, Response, TrackState, check_carried
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.protocol.study import Study
 from labcrane.recording.journal_reader import LoggedEvent, SessionLog, read_journal
 from labcrane.recording.paths import parts
-from labcrane.session.practice import WarmUp
+from labcrane.session.standing import EXAMINER, STOP
 
 Policy = Literal["continue", "redo_trial", "redo_block"]
 
@@ -192,10 +193,6 @@ class Progress:
             self.held.add(STOP)
         elif data["by"] in {EXAMINER, STOP}:
             self.held.add(data["by"])
-
-
-EXAMINER, STOP = "examiner", "stop rule"
-"""The people who can hold a session: it goes on when they say so, also after a resumption."""
 
 
 def carried_in(context: Mapping[str, Any]) -> tuple[Response, ...]:

@@ -8,6 +8,7 @@ from collections.abc import Generator, Iterable, Mapping, Sequence
 
 from labcrane.core.records import Event, Frame, Phase, Trial, Value
 from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
+from labcrane.design.practice import WarmUp
 from labcrane.participants.personal_data import personal
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
@@ -33,16 +34,12 @@ from labcrane.session.commands import (
 )
 from labcrane.session.live_settings import FeedbackSettings
 from labcrane.session.pause import DISK, INPUT, Suspenders
-from labcrane.session.practice import WarmUp
 from labcrane.session.questionnaire import QuestionnaireRun
-from labcrane.session.resume import COMPLETE, EXAMINER, INCOMPLETE, STOP, Ledger, owed_text
+from labcrane.session.resume import COMPLETE, INCOMPLETE, Ledger, owed_text
+from labcrane.session.standing import EXAMINER, STOP, SessionStage, Standing, why_not
 from labcrane.session.trial import TrialRun
 
 Ticks = Generator[None, Frame, None]
-
-
-STAGES = {"trial", "break", "fixation", "questionnaire"}
-"""What can be skipped."""
 
 
 class Sequencer:
@@ -84,11 +81,10 @@ class Sequencer:
         self._settings = FeedbackSettings({**study.cues, **study.sounds})
         self._notes: list[tuple[str, dict[str, Value]]] = []  # stamped with the tick they fall in
         self._ledger = ledger or Ledger(study, plan)
+        # What can still be judged may have ended before this process began.
+        self._standing = Standing(SessionStage.BETWEEN, last=self._ledger.unjudged)
         self._held = Suspenders(study.protocol.on_fault, self._say, awaits)
         self._attempt: TrialRun | None = None
-        self._last: TrialRun | None = None  # the one that runs, else the one that ended last
-        self._before = self._ledger.unjudged  # ended before this process began
-        self._stage = ""
         self._step = 0
         self._questionnaire: QuestionnaireRun | None = None
         self._wishes: set[Order] = set()  # to start, skip or repeat what runs now
@@ -102,6 +98,11 @@ class Sequencer:
     def step(self) -> int:
         """Number of the plan's step that runs; 0 before the first."""
         return self._step
+
+    @property
+    def standing(self) -> Standing:
+        """Where the session stands."""
+        return self._standing
 
     @property
     def moving(self) -> bool:
@@ -183,26 +184,26 @@ class Sequencer:
     def _gate(self, what: str) -> Ticks:
         if not self._waits:
             return
-        self._enter("waiting")
+        self._enter()
         self._note("waiting", what=what)
         while Order.START not in self._wishes and not self._held.ending:
             yield
-        self._enter("")
+        self._enter()
 
     def _break(self, step: PlannedStep) -> Ticks:
         left = round(step.seconds * self._rate_hz)
-        self._enter("break")
+        self._enter()
         self._note("break.start", seconds=step.seconds)
         while left > 0 and Order.SKIP not in self._wishes and not self._held.ending:
             yield
             left -= 1
         self._note("break.end", left=left / self._rate_hz)
-        self._enter("")
+        self._enter()
 
     def _fixation(self, step: PlannedStep) -> Ticks:
         """Show each point for its time in one piece; after a pause, from its beginning."""
         yield from self._gate("fixation")
-        self._enter("fixation")
+        self._enter()
         for number, (x, y) in enumerate(step.points, start=1):
             left = round(step.seconds * self._rate_hz)
             while left > 0 and not self._wished_on():
@@ -215,7 +216,7 @@ class Sequencer:
                     yield
                     left -= 1
                 self._note("fixation.over", point=number, done=left == 0)
-        self._enter("")
+        self._enter()
 
     def _wished_on(self) -> bool:
         """Whether somebody wants to go on to what comes next, or to end."""
@@ -257,12 +258,12 @@ class Sequencer:
         about = self._ledger.unjudged
         if asked or not (self._waits and about) or self._held.ending:
             return
-        self._enter("waiting")
+        self._enter()
         self._note("judgement.awaited", **about)
         while Order.START not in self._wishes and not self._held.ending:
             yield
         self._note("judgement.over", **about, done=not self._held.ending)
-        self._enter("")
+        self._enter()
 
     def _trial(self, block: PlannedBlock, trial: Trial) -> Ticks:
         task = self._study.tasks[block.task]
@@ -273,12 +274,12 @@ class Sequencer:
         if trial.planned.start_pose is not None:
             self._rig.dynamics.reset(trial.planned.start_pose)
         self._note("trial.start", **attempt.about)
-        self._enter("trial", attempt)
+        self._enter(attempt)
         while not attempt.phase.over:
             frame = yield
             attempt.evaluate(frame, self._wished_end())
-        self._enter("")
-        self._ledger.take("trial.end", attempt.row)
+        self._enter()
+        self._know("trial.end", attempt.row)
         if trial.planned.counted:
             self._warm_up.count(block, attempt.phase)
         if attempt.phase is Phase.REPEATED:
@@ -297,7 +298,7 @@ class Sequencer:
         questionnaire = self._questionnaire = QuestionnaireRun(
             self._study, self._plan, name, self._step, answered, after
         )
-        self._enter("questionnaire")
+        self._enter()
         for said in questionnaire.begin(simulated=not self._waits):
             self._say(*said)
         yield
@@ -306,7 +307,7 @@ class Sequencer:
         self._questionnaire = None
         for said in questionnaire.end(skipped=Order.SKIP in self._wishes):
             self._say(*said)
-        self._enter("")
+        self._enter()
         if self._waits and questionnaire.alarming:
             self._held.hold(STOP)
         yield from self._decided()
@@ -325,9 +326,8 @@ class Sequencer:
             return Phase.SKIPPED
         return Phase.REPEATED if Order.REPEAT in self._wishes else None
 
-    def _enter(self, stage: str, attempt: TrialRun | None = None) -> None:
-        self._stage, self._attempt = stage, attempt
-        self._last = attempt or self._last
+    def _enter(self, attempt: TrialRun | None = None) -> None:
+        self._attempt = attempt
         self._wishes.clear()
 
     # Orders
@@ -357,7 +357,7 @@ class Sequencer:
         """Return which trial an order is about that came after its end, before the next began."""
         match request:
             case Control(Order.OVERRIDE) | Completion() if not self._attempt:
-                whose = self._last.about if self._last else self._before
+                whose = self._standing.last
                 if not whose:
                     return {}
                 return {"trial": whose["trial"], "attempt": whose["attempt"], "after": True}
@@ -367,7 +367,7 @@ class Sequencer:
         match request:
             case Control(Order.PAUSE):
                 self._held.hold(EXAMINER)
-            case Control(Order.START) if self._paused:
+            case Control(Order.START) if self._standing.paused:
                 self._held.release(EXAMINER)
                 self._held.release(STOP)
             case Control(Order.END):
@@ -388,20 +388,15 @@ class Sequencer:
     def _refusal(self, request: Request) -> str | None:
         """Return why a request makes no sense now, or None when it does."""
         match request:
-            case (
-                Control(Order.REPEAT | Order.OVERRIDE)
-                | Completion()
-                | Malformed(Order.COMPLETION)
-                | Sighting()
-            ) if why := self._without_trial(request):
+            case Control(order) if why := why_not(order, self._standing):
                 return why
-            case Control(Order.SKIP) if self._stage not in STAGES:
-                return "no trial, break or questionnaire is running"
-            case Control(Order.START) if self._stage != "waiting" and not self._paused:
-                awaited = ", ".join(sorted(self._held.awaited))
-                return f"feedback {awaited} is awaited" if awaited else "nothing waits to start"
-            case Control(Order.PAUSE) if EXAMINER in self._held:
-                return "the session is paused already"
+            case Completion() | Malformed(Order.COMPLETION) if why := why_not(
+                Order.COMPLETION, self._standing
+            ):
+                return why
+            case Sighting(what):
+                doubt = self._attempt.doubt(what) if self._attempt else None
+                return why_not(Order.REPORT, self._standing) or doubt
             case AnswerGiven() | Submission():
                 return "no questionnaire is asked"
             case ConsentGiven():
@@ -414,20 +409,6 @@ class Sequencer:
                 return why
         return None
 
-    def _without_trial(self, request: Request) -> str | None:
-        """Return why a request about a trial has none; one that has ended can still be judged."""
-        if request == Control(Order.REPEAT) or isinstance(request, Sighting):
-            if self._attempt is None:
-                return "no trial is running"
-            return self._attempt.doubt(request.what) if isinstance(request, Sighting) else None
-        judged = self._last or self._before
-        return None if judged else "no trial is running, and none has ended"
-
-    @property
-    def _paused(self) -> bool:
-        """Whether it waits for the examiner to let it go on."""
-        return EXAMINER in self._held or STOP in self._held
-
     # What is written down
 
     def _note(self, name: str, **data: Value) -> None:
@@ -435,7 +416,12 @@ class Sequencer:
 
     def _say(self, name: str, data: dict[str, Value]) -> None:
         self._notes.append((name, data))
+        self._know(name, data)
+
+    def _know(self, name: str, data: Mapping[str, Value]) -> None:
+        """Follow an event, in what the session owes and in where it stands."""
         self._ledger.take(name, data)
+        self._standing = self._standing.after(name, data)
 
     def _stamped(self, frame: Frame) -> tuple[Event, ...]:
         if not self._notes:

@@ -10,7 +10,7 @@ import numpy as np
 
 from labcrane.core.clock import Clock, ManualClock, SystemClock
 from labcrane.core.garbage import settled
-from labcrane.core.records import Event, Frame, Phase, Run
+from labcrane.core.records import Event, Frame, Phase, Run, Value
 from labcrane.core.roles import Trigger
 from labcrane.design.counts import TrialCounts
 from labcrane.design.plan import SessionPlan, plan_session
@@ -355,10 +355,13 @@ class Outlook:
         How it stopped, and what follows.
     done
         How many counted trials are over for good.
+    unjudged
+        Trial and attempt of a test that can still be judged; empty for none.
     """
 
     text: str
     done: int
+    unjudged: Mapping[str, Value]
 
 
 def outlook(visit: Visit, admission: Admission) -> Outlook:
@@ -379,7 +382,10 @@ def outlook(visit: Visit, admission: Admission) -> Outlook:
         f"repeated, as new attempts ({policy_of(visit)}): "
         f"{counts.names(again) if again else 'nothing'}",
     ]
-    return Outlook("\n".join(lines), done_before(whole, so_far, left))
+    unjudged = Ledger(visit.study, whole, so_far).unjudged
+    if unjudged.get("trial") in again:
+        unjudged = {}
+    return Outlook("\n".join(lines), done_before(whole, so_far, left), unjudged)
 
 
 def still_owed(visit: Visit, admission: Admission) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from labcrane.core.records import Event, Value, is_done
+from labcrane.session.standing import STOP, SessionStage, Standing
 from labcrane.web.assessment import Assessment
 
 KEPT = 500
@@ -16,42 +17,26 @@ RATES = 60
 """How many of the newest rates of each stream are kept."""
 
 
-@dataclass(frozen=True, slots=True)
-class SessionStage:
-    """Where a session stands by its record alone: what holds it or runs in it comes on top.
-
-    Attributes
-    ----------
-    state
-        ``"starting"``, ``"waiting"``, ``"break"``, ``"fixation"``, ``"judgement"``,
-        ``"between"`` or ``"ended"``.
-    text
-        The same in words.
-    what
-        What waits to be started, if something does.
-    """
-
-    state: str
-    text: str
-    what: str = ""
-
-
-STARTING, BETWEEN = SessionStage("starting", "starting"), SessionStage("between", "between steps")
-JUDGEMENT = SessionStage(
-    "judgement",
-    "the test has ended: say whether it is completed, or override its end, and go on; without a "
-    "word it counts as it ended",
-)
-STAGES = {
-    "consent.needed": SessionStage("waiting", "waits for the participant's consent"),
+STARTING, BETWEEN = "starting", "between steps"
+SAID = {
+    "consent.needed": "waits for the participant's consent",
     "consent.given": STARTING,
-    "trial.start": SessionStage("between", "trial"),
-    "judgement.awaited": JUDGEMENT,
+    "waiting": "waits to start: {what}",
+    "trial.start": "trial",
+    "judgement.awaited": "the test has ended: say whether it is completed, or override its end, "
+    "and go on; without a word it counts as it ended",
+    "break.start": "break of {seconds} s",
+    "fixation.shown": "eye tracker's check: point {point}",
+    "questionnaire.start": "questionnaire: {title}",
+    "session.end": "ended: {reason}",
     **dict.fromkeys(
         ("step.end", "questionnaire.end", "break.end", "fixation.over", "judgement.over"), BETWEEN
     ),
 }
-"""Where the session stands after an event that says nothing more of it."""
+"""What is said of where the session stands after an event."""
+
+EARLIER_RULE = "a stop rule was met before: go on, or end the session"
+"""What is said of a stop rule that held a session which was resumed."""
 
 LOST = {
     "input": "the controls", "disk": "the disk", "stream": "stream", "feedback": "",
@@ -83,7 +68,10 @@ class SessionLeft:
     advice: tuple[str, ...] = ()
 
 
-ROUTINE = ("trial.", "order.", "questionnaire.", "step.", "block.", "pause.", "session.", "signal.")
+ROUTINE = (
+    "trial.", "order.", "questionnaire.", "step.", "block.", "pause.", "session.", "signal.",
+    "scene.", "consent.", "stop_rule.",
+)  # fmt: skip
 """Beginnings of event names that are no counts of a trial."""
 
 
@@ -96,8 +84,10 @@ class SessionView:
         Grows with every event.
     events
         The newest events, oldest first.
-    stage, holds, trial, trials_done, counts
-        Where the session stands, who holds it, the running trial, and what happened in it.
+    standing, text
+        Where the session stands, and the same in words.
+    trials_done, counts
+        How many trials are done, and what happened in the running one.
     things
         What stands around the machine in the running trial, as of
         :func:`labcrane.machines.scene_codec.read_placed`; empty for nothing.
@@ -128,9 +118,8 @@ class SessionView:
     def __init__(self) -> None:
         self.version = 0
         self.events: deque[Event] = deque(maxlen=KEPT)
-        self.stage = STARTING
-        self.holds: set[str] = set()
-        self.trial: Mapping[str, Value] = {}
+        self.standing = Standing()
+        self.text = STARTING
         self.trial_began = 0.0
         self.trials_done = 0
         self.things = ""
@@ -147,7 +136,6 @@ class SessionView:
         self.settings: dict[str, dict[str, Value]] = {}
         self.rows: list[Mapping[str, Value]] = []
         self.ended: SessionLeft | None = None
-        self.last_trial: Mapping[str, Value] = {}
         self.alarm = ""
         self.consent: Mapping[str, Value] = {}
         self.assessment = Assessment()
@@ -155,12 +143,20 @@ class SessionView:
     @property
     def over(self) -> bool:
         """Whether the session has ended."""
-        return self.stage.state == "ended" or self.ended is not None
+        return self.standing.stage is SessionStage.ENDED or self.ended is not None
+
+    @property
+    def trial(self) -> Mapping[str, Value]:
+        """What is known of the running trial; empty for none."""
+        return self.standing.trial
 
     def take(self, event: Event) -> None:
         """Take in the next event."""
         self.events.append(event)
         self.assessment.take(event)
+        self.standing = self.standing.after(event.name, event.data)
+        if event.name in SAID:
+            self.text = SAID[event.name].format(**event.data)
         kind, _, what = event.name.partition(".")
         match kind:
             case "questionnaire":
@@ -171,23 +167,27 @@ class SessionView:
                 self.things = str(event.data["things"])
             case "consent":
                 self.consent = event.data if what == "needed" else {}
-            case "pause":
-                who = str(event.data["by"])
-                (self.holds.add if what == "start" else self.holds.discard)(who)
+            case "pause" if event.data["by"] == STOP:
+                self.alarm = (self.alarm or EARLIER_RULE) if what == "start" else ""
             case "stop_rule":
                 data = event.data
                 self.alarm = (
                     f"{data['questionnaire']} {data['score']} is {data['value']}, above "
                     f"{data['above']}: go on, or end the session"
                 )
-            case _ if self.trial and not event.name.startswith(ROUTINE):
-                self.counts[event.name] += 1
-        if event.name == "session.standing":
-            self.trials_done = int(str(event.data["done"]))
+        self._count(event)
         if kind in LOST:
             self._fault(kind, what, event.data)
-        self._stage(event)
         self.version += 1
+
+    def _count(self, event: Event) -> None:
+        """Count what happens in a trial, and note what was reported as seen."""
+        if event.name == "session.standing":
+            self.trials_done = int(str(event.data["done"]))
+        elif event.name == "order.report" and event.data["refused"] is None:
+            self.reported.append(str(event.data["text"]))
+        elif self.trial and not event.name.startswith(ROUTINE):
+            self.counts[event.name] += 1
 
     def hear_of_streams(self, status: Mapping[str, Any]) -> None:
         """Take in what the recorder says now of the streams of others."""
@@ -209,36 +209,13 @@ class SessionView:
         elif what in {"back", "ready"}:
             self.faults.pop(key, None)
 
-    def _stage(self, event: Event) -> None:
-        self.stage = STAGES.get(event.name, self.stage)
-        match event.name:
-            case "waiting":
-                what = str(event.data["what"])
-                self.stage = SessionStage("waiting", f"waits to start: {what}", what)
-            case "break.start":
-                self.stage = SessionStage("break", f"break of {event.data['seconds']} s")
-            case "fixation.shown":
-                text = f"eye tracker's check: point {event.data['point']}"
-                self.stage = SessionStage("fixation", text)
-            case "questionnaire.start":
-                self.stage = SessionStage("between", f"questionnaire: {event.data['title']}")
-            case "session.end":
-                self.stage = SessionStage("ended", f"ended: {event.data['reason']}")
-            case "pause.end":
-                self.alarm = ""
-            case "judgement.awaited":
-                self.last_trial = self.last_trial or event.data  # it may have ended before a resume
-            case "order.report" if event.data["refused"] is None:
-                self.reported.append(str(event.data["text"]))
-
     def _trial(self, what: str, time: float, data: Mapping[str, Value]) -> None:
         if what == "start":
-            self.trial, self.trial_began = data, time
+            self.trial_began = time
             self.counts.clear()
             self.reported.clear()
         elif what == "end":
-            self.trial, self.things = {}, ""
-            self.last_trial = data
+            self.things = ""
             self.trials_done += is_done(data)
             if is_done(data):
                 self.rows.append(data)

@@ -387,7 +387,7 @@ def test_page_and_terminal_say_what_it_waits_for_and_can_judge_also_after_a_resu
     view.take(Event("step.start", 0.0, {"step": 2, "kind": "block"}))
     view.take(Event("judgement.awaited", 1.0, {"trial": 3, "attempt": 1}))
     assert state_of(view) == "judgement"
-    assert "say whether it is completed, or override its end, and go on" in view.stage.text
+    assert "say whether it is completed, or override its end, and go on" in view.text
     found = {one.ident: one for one in buttons(view)}
     assert (found["order-start"].label, found["order-start"].primary) == ("Go on", True)
     for ident in ("order-start", "order-override", "order-completion0", "order-completion1"):

@@ -223,7 +223,7 @@ def test_the_lamp_tells_of_a_view_of_the_operator_that_shows_too_little(
     assert lamp_of(view, Punctual(), ExpectedSession(1 / 240)).level == "ok", (
         "a view of somebody else"
     )
-    view.trial = {}
+    view.take(Event("trial.end", 9.0, {**TRIAL, "practice": False, "outcome": "success"}))
     assert lamp_of(view, Punctual(), EXPECTED).level == "ok", "between movements"
 
 

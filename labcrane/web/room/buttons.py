@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from labcrane.session.commands import Order
-from labcrane.web.room.condition import EXAMINER, state_of
+from labcrane.session.standing import ENDED, EXAMINER, STOP, SessionStage, Standing, why_not
 from labcrane.web.state import SessionView
 
 
@@ -36,20 +36,6 @@ class Button:
         return asdict(self)
 
 
-STARTS: Mapping[str, str] = {
-    "waiting": "Start",
-    "paused": "Go on",
-    "decision": "Go on all the same",
-    "fault": "Go on",
-    "judgement": "Go on",
-}
-NOT_YET = "the session waits for its streams and feedback, and begins by itself"
-PAUSABLE = {"waiting", "running", "break", "fixation", "questionnaire", "between", "fault",
-            "judgement"}  # fmt: skip
-SKIPPABLE = {"break", "fixation", "questionnaire"}
-NO_TRIAL = "no trial is running"
-
-
 def answers(stream: Mapping[str, Any]) -> list[Button]:
     """Return the buttons that say which stream of a type is meant, where that is asked."""
     label, words = stream["label"], [each["identity"] for each in stream["candidates"]]
@@ -71,33 +57,35 @@ def answers(stream: Mapping[str, Any]) -> list[Button]:
 
 def buttons(view: SessionView) -> list[Button]:
     """Return all buttons as they are now; exactly one is primary unless nothing can be done."""
-    state = state_of(view)
-    over = "the session has ended" if state == "ended" else ""
-    startable = (state in STARTS and state != "fault") or EXAMINER in view.holds
-    idle = NOT_YET if state == "starting" else "nothing waits to start"
-    waits = view.stage.what if state == "waiting" else ""
-    start = f"{STARTS.get(state, 'Start')}{': ' + waits if waits else ''}"
-    pause = "" if state in PAUSABLE and EXAMINER not in view.holds else "nothing to pause"
-    judged = "" if view.trial or view.last_trial else NO_TRIAL
-    running = "" if view.trial else NO_TRIAL
-    skips = "" if view.trial or state in SKIPPABLE else "nothing to skip"
+
+    def why(order: Order) -> str:
+        return ENDED if view.over else why_not(order, view.standing) or ""
+
+    start, pause, judged = why(Order.START), why(Order.PAUSE), why(Order.COMPLETION)
     return [
         Button(
-            "order-start", Order.START, "", start, "Space",
-            over or ("" if startable else idle), primary=startable,
+            "order-start", Order.START, "", _start(view.standing), "Space", start, primary=not start
         ),
         Button(
-            "order-pause", Order.PAUSE, "", "Pause", "P", over or pause,
-            primary=not startable and not pause and not over,
+            "order-pause", Order.PAUSE, "", "Pause", "P", pause, primary=bool(start) and not pause
         ),
-        Button("order-repeat", Order.REPEAT, "", "Repeat trial", "R", over or running),
-        Button("order-skip", Order.SKIP, "", "Skip", "S", over or skips,
+        Button("order-repeat", Order.REPEAT, "", "Repeat trial", "R", why(Order.REPEAT)),
+        Button("order-skip", Order.SKIP, "", "Skip", "S", why(Order.SKIP),
                asks="Skip what runs now? It is not asked for again.", danger=True),
-        Button("order-override", Order.OVERRIDE, "", "Override end", "O", over or judged),
-        Button("order-completion1", Order.COMPLETION, "1", "Completed", "C", over or judged),
-        Button("order-completion0", Order.COMPLETION, "0", "Not completed", "X", over or judged),
+        Button("order-override", Order.OVERRIDE, "", "Override end", "O", why(Order.OVERRIDE)),
+        Button("order-completion1", Order.COMPLETION, "1", "Completed", "C", judged),
+        Button("order-completion0", Order.COMPLETION, "0", "Not completed", "X", judged),
         Button(
-            "order-end", Order.END, "", "End session", "E", over,
+            "order-end", Order.END, "", "End session", "E", why(Order.END),
             asks="End the session now? What is recorded is kept.", danger=True,
         ),
     ]  # fmt: skip
+
+
+def _start(standing: Standing) -> str:
+    """Return what the order to start does now."""
+    if STOP in standing.holds:
+        return "Go on all the same"
+    if EXAMINER in standing.holds or standing.stage is SessionStage.JUDGEMENT:
+        return "Go on"
+    return f"Start: {standing.what}" if standing.what else "Start"

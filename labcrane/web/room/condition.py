@@ -5,10 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from labcrane.analysis.presented import LOG, PresentedLimits
+from labcrane.session.standing import EXAMINER, STOP, SessionStage
 from labcrane.web.live import Live
 from labcrane.web.state import SessionView
 
-EXAMINER = "examiner"
 SILENT_S = 1.0
 """A running session sends frames all the time; after so long without one it is said."""
 
@@ -45,21 +45,22 @@ REMEDIES: Mapping[str, str] = {
 
 def state_of(view: SessionView) -> str:
     """Return which of :data:`STATES` a session is in."""
+    standing = view.standing
     if view.over:
         return "ended"
-    if view.consent:
+    if standing.stage is SessionStage.CONSENT:
         return "consent"
-    if view.alarm:
+    if STOP in standing.holds:
         return "decision"
-    if view.holds - {EXAMINER}:
+    if standing.holds - {EXAMINER}:
         return "fault"
-    if EXAMINER in view.holds:
+    if EXAMINER in standing.holds:
         return "paused"
-    if view.form is not None:
-        return "questionnaire"
-    if view.trial:
+    if standing.trial:
         return "running"
-    return view.stage.state
+    if standing.stage is SessionStage.BETWEEN and standing.awaited:
+        return "starting"
+    return str(standing.stage)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +108,7 @@ def lamp_of(view: SessionView, live: Live, expected: ExpectedSession, trouble: s
     worst = next((one for one in found if one.level == "bad"), None)
     if worst or found:
         return worst or found[0]
-    paused = EXAMINER in view.holds
+    paused = EXAMINER in view.standing.holds
     return Lamp("ok", "paused by you; all is well" if paused else "all is well")
 
 

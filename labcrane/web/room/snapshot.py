@@ -71,7 +71,8 @@ class Snapshot:
         context = self._context
         session, plan = context.session, context.plan
         state = state_of(session)
-        held = f" · HELD by {', '.join(sorted(session.holds))}" if session.holds else ""
+        holds = ", ".join(sorted(session.standing.holds))
+        held = f" · HELD by {holds}" if holds else ""
         trouble = context.shown.trouble or context.live.trouble
         lamp = lamp_of(session, context.live, self._expected, trouble)
         return {
@@ -82,7 +83,7 @@ class Snapshot:
             ])),
             "state": state,
             "now": self._running() if state == "running" else STATES.get(state, ""),
-            "stage": session.stage.text + held,
+            "stage": session.text + held,
             "next": self._next(),
             "facts": " · ".join(self._facts()),
             "left": self._left(state),

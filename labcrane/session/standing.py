@@ -1,0 +1,162 @@
+"""Standing of a session: what runs, who holds it, and which orders make sense now.
+
+It follows from the session's events alone, so that the sequencer, every page and every terminal
+that hear them have the same, and one rule says what can be ordered.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Any
+
+from labcrane.session.commands import Order
+
+EXAMINER, STOP = "examiner", "stop rule"
+"""The people who can hold a session: it goes on when they say so, also after a resumption."""
+
+
+class SessionStage(StrEnum):
+    """What runs in a session, whoever holds it."""
+
+    STARTING = "starting"  # nothing has begun: streams and feedback are awaited
+    CONSENT = "consent"  # the participant's consent is awaited before it begins
+    WAITING = "waiting"  # a step waits for the order to start
+    TRIAL = "trial"
+    JUDGEMENT = "judgement"  # a test has ended and can be judged
+    BREAK = "break"
+    FIXATION = "fixation"
+    QUESTIONNAIRE = "questionnaire"
+    BETWEEN = "between"  # steps or trials; here a session waits for feedback, or for a decision
+    ENDED = "ended"
+
+
+RUNS: Mapping[str, SessionStage] = {
+    "consent.needed": SessionStage.CONSENT,
+    "consent.given": SessionStage.STARTING,
+    "waiting": SessionStage.WAITING,
+    "trial.start": SessionStage.TRIAL,
+    "judgement.awaited": SessionStage.JUDGEMENT,
+    "break.start": SessionStage.BREAK,
+    "fixation.shown": SessionStage.FIXATION,
+    "questionnaire.start": SessionStage.QUESTIONNAIRE,
+    **dict.fromkeys(
+        ("step.start", "trial.end", "judgement.over", "break.end", "questionnaire.end", "step.end"),
+        SessionStage.BETWEEN,
+    ),
+    "session.end": SessionStage.ENDED,
+}
+"""What runs after an event that tells so."""
+
+SKIPPABLE = {
+    SessionStage.TRIAL,
+    SessionStage.BREAK,
+    SessionStage.FIXATION,
+    SessionStage.QUESTIONNAIRE,
+}
+"""What can be skipped."""
+
+ENDED = "the session has ended"
+NOT_BEGUN = "the session has not begun; order it again when it has"
+NO_TRIAL = "no trial is running"
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """Where a session stands.
+
+    Attributes
+    ----------
+    stage
+        What runs in it.
+    what
+        What waits to be started, if something does.
+    kind
+        Kind of the step that runs.
+    holds
+        Who and what holds it.
+    trial
+        What is known of the running trial, as of ``trial.start``; empty for none.
+    last
+        What is known of the trial that ended last, its number and attempt at least.
+    awaited
+        Views and sounds that have yet to present.
+    """
+
+    stage: SessionStage = SessionStage.STARTING
+    what: str = ""
+    kind: str = ""
+    holds: frozenset[str] = frozenset()
+    trial: Mapping[str, Any] = field(default_factory=dict)
+    last: Mapping[str, Any] = field(default_factory=dict)
+    awaited: frozenset[str] = frozenset()
+
+    @property
+    def paused(self) -> bool:
+        """Whether it waits for people to let it go on."""
+        return bool(self.holds & {EXAMINER, STOP})
+
+    def after(self, name: str, data: Mapping[str, Any]) -> "Standing":
+        """Return where the session stands after an event."""
+        now = self._held(name, data)
+        if name in RUNS:
+            now = now.at(RUNS[name])
+        match name:
+            case "step.start":
+                return replace(now, kind=str(data["kind"]))
+            case "waiting":
+                return replace(now, what=str(data["what"]))
+            case "order.start" if data["refused"] is None and not self.paused:
+                return now.at(
+                    SessionStage.FIXATION if self.kind == "fixation" else SessionStage.BETWEEN
+                )
+            case "trial.start":
+                return replace(now, trial=data)
+            case "trial.end":
+                return replace(now, trial={}, last=data)
+            case "judgement.awaited" | "session.standing" if "trial" in data:
+                return replace(now, last=self.last or data)  # it may have ended before a resume
+        return now
+
+    def at(self, stage: SessionStage) -> "Standing":
+        """Return the standing with something else running in it."""
+        return replace(self, stage=stage, what="")
+
+    def _held(self, name: str, data: Mapping[str, Any]) -> "Standing":
+        """Return where it stands after somebody held it or let it go, or feedback came."""
+        begun = self.at(SessionStage.BETWEEN) if self.stage is SessionStage.STARTING else self
+        match name:
+            case "pause.start":
+                return replace(begun, holds=self.holds | {data["by"]})
+            case "pause.end":
+                return replace(self, holds=self.holds - {data["by"]})
+            case "feedback.awaited":
+                return replace(begun, awaited=self.awaited | {data["what"]})
+            case "feedback.ready":
+                return replace(self, awaited=self.awaited - {data["what"]})
+            case "feedback.lost" if data["left_out"]:
+                return replace(self, awaited=self.awaited - {data["what"]})
+        return self
+
+
+def why_not(order: Order, standing: Standing) -> str | None:
+    """Return why an order makes no sense now, or None when it does."""
+    stage = standing.stage
+    if stage is SessionStage.ENDED:
+        return ENDED
+    if stage in {SessionStage.STARTING, SessionStage.CONSENT} and order is not Order.END:
+        return NOT_BEGUN
+    match order:
+        case Order.START if (
+            stage not in {SessionStage.WAITING, SessionStage.JUDGEMENT} and not standing.paused
+        ):
+            awaited = ", ".join(sorted(standing.awaited))
+            return f"feedback {awaited} is awaited" if awaited else "nothing waits to start"
+        case Order.PAUSE if EXAMINER in standing.holds:
+            return "the session is paused already"
+        case Order.SKIP if stage not in SKIPPABLE:
+            return "no trial, break or questionnaire is running"
+        case Order.REPEAT | Order.REPORT if not standing.trial:
+            return NO_TRIAL
+        case Order.OVERRIDE | Order.COMPLETION if not (standing.trial or standing.last):
+            return "no trial is running, and none has ended"
+    return None
