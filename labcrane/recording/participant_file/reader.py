@@ -61,7 +61,7 @@ class Stream:
 
     @cached_property
     def time_error(self) -> FloatArray:
-        """How far each time may be off at 95 %, in milliseconds, shape ``(n,)``.
+        """How far each time may be off at 95 %, in seconds, shape ``(n,)``.
 
         Zero for the session's own signals, whose clock it is; NaN where it is not known, as in
         files of before it was worked out: ``labcrane resync`` does.
@@ -69,7 +69,7 @@ class Stream:
         if "rate_hz" not in self.attrs:
             return np.zeros(len(self.time))
         error = self._beside("time_error")
-        return np.full(len(self.time), np.nan) if error is None else 1e3 * error
+        return np.full(len(self.time), np.nan) if error is None else error
 
     @cached_property
     def time_basis(self) -> npt.NDArray[np.str_]:
