@@ -356,3 +356,113 @@ def test_a_mistake_in_a_description_is_told_with_its_line(
     said = " ".join(capsys.readouterr().err.split())
     assert "protocol.yaml:8" in said
     assert "'tipp' is not a key of machine" in said
+
+
+MIMIC = """\
+<robot name="levelled">
+ <link name="base"/>{links}<link name="fork"/>
+ <joint name="slew" type="revolute"><parent link="base"/><child link="l0"/>
+  <axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="9" velocity="1"/></joint>
+ <joint name="lift" type="revolute"><parent link="l0"/><child link="l1"/><origin xyz=".2 0 .3"/>
+  <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="9" velocity="1"/></joint>
+ <joint name="reach" type="revolute"><parent link="l1"/><child link="l2"/><origin xyz="2 0 0"/>
+  <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="9" velocity="1"/></joint>
+ <joint name="level" type="revolute"><parent link="l2"/><child link="l3"/><origin xyz="1 0 0"/>
+  <axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="9" velocity="1"/>{mimic}</joint>
+ <joint name="bar" type="revolute"><parent link="l1"/><child link="l4"/><origin xyz=".5 0 0"/>
+  <axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="9" velocity="1"/>{beside}</joint>
+ <joint name="end" type="fixed"><parent link="l3"/><child link="fork"/><origin xyz=".6 0 0"/>
+ </joint>
+</robot>
+"""
+WEIGHT = '<mass value="9"/><inertia ixx="1" iyy="1" izz="1"/>'
+
+
+def levelled(
+    folder: Path, mimic: str, beside: str = "", joints: str = "slew lift reach"
+) -> Machine:
+    links = "".join(f'<link name="l{at}"><inertial>{WEIGHT}</inertial></link>' for at in range(5))
+    (folder / "arm.urdf").write_text(MIMIC.format(links=links, mimic=mimic, beside=beside))
+    return described({"urdf": "arm.urdf", "joints": joints.split(), "tip": "fork"}, folder)
+
+
+@pytest.mark.parametrize(
+    ("mimic", "joints", "said"),
+    [
+        ('<mimic joint="lift" multiplier="-1"/>', "slew lift reach", "'level' .* moves with lift"),
+        ('<mimic joint="bar"/>', "slew lift reach", "'level' .* moves with lift"),
+        ('<mimic joint="lift"/>', "slew lift reach level", "'level' .* moves with lift"),
+        ('<mimic joint="end" offset="0.5"/>', "slew lift reach", "'level' .* moves with end"),
+        ('<mimic joint="boom"/>', "slew lift reach", "mimics 'boom', which is not there"),
+        ('<mimic joint="level"/>', "slew lift reach", "mimics 'level', which is not there or mim"),
+    ],
+)
+def test_a_joint_that_mimics_another_on_the_way_to_the_tip_is_refused(
+    mimic: str, joints: str, said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ProtocolError, match=said):
+        levelled(tmp_path, mimic, '<mimic joint="lift" multiplier="2"/>', joints)
+
+
+def test_a_joint_that_mimics_one_that_stays_or_is_elsewhere_changes_nothing(tmp_path: Path) -> None:
+    plain = levelled(tmp_path, "")
+    beside = levelled(tmp_path, '<mimic joint="end"/>', '<mimic joint="lift"/>')
+    assert beside.joints == plain.joints
+
+
+HINGED = """\
+<mujoco><compiler angle="radian"/><worldbody>
+ <body name="post"><joint name="slew" axis="0 0 1" range="-2 2"/><geom size=".1" mass="9"/>
+  <body name="boom" pos=".2 0 .3"><joint name="lift" axis="0 1 0" range="-1 1"/>
+   <geom size=".1" mass="9"/>
+   <body name="bar" pos=".5 0 0"><joint name="bar" axis="0 1 0"/><geom size=".1" mass="1"/></body>
+   <body name="stick" pos="2 0 0"><joint name="reach" axis="0 1 0" range="-1 1"/>
+    <geom size=".1" mass="9"/>
+    <body name="plate" pos="1 0 0">{plate}<geom size=".1" mass="9"/><site name="fork" pos=".6 0 0"/>
+ </body></body></body></body></worldbody>
+ <tendon><fixed name="both"><joint joint="{last}" coef="1"/><joint joint="lift" coef="1"/></fixed>
+ </tendon>
+ <equality>{equality}</equality></mujoco>
+"""
+LEVEL = '<joint name="level" axis="0 1 0" range="-2 2"/>'
+
+
+def hinged(folder: Path, equality: str, plate: str = LEVEL) -> Machine:
+    last = "level" if plate else "reach"
+    (folder / "arm.xml").write_text(HINGED.format(equality=equality, plate=plate, last=last))
+    joints = ["slew", "lift", "reach"]
+    speeds, efforts = dict.fromkeys(joints, 30.0), dict.fromkeys(joints, 100.0)
+    fields = {"mjcf": "arm.xml", "joints": joints, "tip": "fork"}
+    return described({**fields, "speeds_deg_s": speeds, "efforts": efforts}, folder)
+
+
+@needs("mujoco")
+@pytest.mark.parametrize(
+    ("equality", "plate", "said"),
+    [
+        ('<joint joint1="level" joint2="lift" polycoef="0 -1 0 0 0"/>', LEVEL, "moves with lift"),
+        ('<joint joint1="level" polycoef="0.5 0 0 0 0"/>', LEVEL, "'level' .* is held"),
+        ('<joint joint1="reach" joint2="lift"/>', "", "'lift' .* moves with reach"),
+        ('<tendon tendon1="both"/>', LEVEL, "'level' .* moves with lift .equality: tendon"),
+        ('<tendon tendon1="both"/>', "", "'lift' .* moves with reach .equality: tendon"),
+        ('<connect body1="bar" body2="plate" anchor="0 0 .3"/>', LEVEL, "equality: connect"),
+        ('<weld body1="bar" body2="plate"/>', LEVEL, "'level' .* moves with bar and reach"),
+    ],
+)
+def test_a_joint_that_an_equality_moves_on_the_way_to_the_tip_is_refused(
+    equality: str, plate: str, said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ProtocolError, match=said):
+        hinged(tmp_path, equality, plate)
+
+
+@needs("mujoco")
+def test_an_equality_that_moves_no_joint_on_the_way_changes_nothing(tmp_path: Path) -> None:
+    plain = hinged(tmp_path, "")
+    for equality in (
+        '<joint joint1="bar" joint2="lift"/>',
+        '<joint joint1="level"/>',
+        '<connect body1="bar" body2="stick" anchor="0 0 .3"/>',
+        '<joint joint1="level" joint2="lift" active="false"/>',
+    ):
+        assert hinged(tmp_path, equality).joints == plain.joints

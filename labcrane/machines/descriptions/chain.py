@@ -34,6 +34,24 @@ class ChainError(ValueError):
         self.name = name
 
 
+def coupled(name: str, others: str, what: str) -> ChainError:
+    """Return why a joint on the way to the tip cannot be driven or left where it is.
+
+    Parameters
+    ----------
+    others
+        The joints that it moves with; empty where it is held.
+    what
+        What of the file says so.
+    """
+    how = f"moves with {others}" if others else "is held"
+    return ChainError(
+        f"joint {name!r} on the way to the tip {how} ({what}), which is not followed here: the tip "
+        "would be somewhere else; name a tip before it, or a file without this coupling",
+        name=name,
+    )
+
+
 @dataclass(frozen=True)
 class Mass:
     """What moves with one joint and no further one.

@@ -1,17 +1,18 @@
 """MJCF file as MuJoCo compiles it: bodies with their masses, hinges with their axes.
 
-A joint that a study does not name stays where the file has it. MJCF has no largest speeds: the
-protocol gives them, and torques where the file has none.
+A joint that a study does not name stays where the file has it; one that an ``equality`` moves on
+the way to the tip is refused. MJCF has no largest speeds: the protocol gives them, and torques
+where the file has none.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from labcrane.errors import nearest
-from labcrane.machines.descriptions.chain import Axis, ChainError, Mass, together
+from labcrane.machines.descriptions.chain import Axis, ChainError, Mass, coupled, together
 from labcrane.machines.descriptions.robot_xml import check_robot
 from labcrane.types import FloatArray
 
@@ -83,6 +84,7 @@ class MjcfFile:
                 f"the joints on the way to {tip!r} are {', '.join(way) or 'none'} of those named; "
                 "name them in this order, one to a body"
             )
+        self._check_coupled(names.values(), tip)
         moved: dict[str, list[int]] = {name: [] for name in way}
         for body in range(1, self._model.nbody):
             for above in reversed(self._way(body)):
@@ -92,6 +94,49 @@ class MjcfFile:
         return [
             self._axis(called, name, moved[name], speeds, efforts) for called, name in names.items()
         ]
+
+    def _check_coupled(self, driven: Collection[str], tip: str) -> None:
+        """Refuse joints on the way to the tip that an ``equality`` of the file moves or holds.
+
+        A joint elsewhere that follows one of them moves neither the tip nor what is driven.
+        """
+        way = set(self._way(self._body_of(tip)))
+        ours = {at for at, body in enumerate(self._model.jnt_bodyid) if int(body) in way}
+        passive = {at for at in ours if self._names[at] not in driven}
+        for at in np.flatnonzero(self._model.eq_active0):
+            kind = self._mujoco.mjtEq(self._model.eq_type[at])
+            tied = self._tied(int(at), kind)
+            bound = [*sorted(tied & passive), *sorted(tied & ours - passive)]
+            if tied & passive or len(bound) > 1 or (bound and len(tied) == 1):
+                others = " and ".join(self._names[each] for each in sorted(tied - {bound[0]}))
+                what = f"equality: {kind.name.removeprefix('mjEQ_').lower()}"
+                raise coupled(self._names[bound[0]], others, what)
+
+    def _tied(self, at: int, kind: Any) -> set[int]:
+        """Return the joints that one equality makes move together."""
+        model, kinds = self._model, self._mujoco.mjtEq
+        ends = [int(each[at]) for each in (model.eq_obj1id, model.eq_obj2id)]
+        if kind == kinds.mjEQ_JOINT:
+            if ends[1] < 0 and model.eq_data[at, 0] == 0.0:
+                return set()  # held where the file has it, where it stays here too
+            return {each for each in ends if each >= 0}
+        if kind == kinds.mjEQ_TENDON:
+            return {joint for tendon in ends if tendon >= 0 for joint in self._counted(tendon)}
+        if kind not in {kinds.mjEQ_CONNECT, kinds.mjEQ_WELD}:
+            return set()
+        if model.eq_objtype[at] == self._mujoco.mjtObj.mjOBJ_SITE:
+            ends = [int(model.site_bodyid[each]) for each in ends]
+        # The loop that they close is of the joints below which only one of the two lies.
+        below = [set(self._way(each)) for each in ends]
+        loop = below[0] ^ below[1]
+        return {joint for joint, body in enumerate(model.jnt_bodyid) if int(body) in loop}
+
+    def _counted(self, tendon: int) -> set[int]:
+        """Return the joints that a tendon counts; of one with a way through space, none."""
+        model, joint = self._model, int(self._mujoco.mjtWrap.mjWRAP_JOINT)
+        start = int(model.tendon_adr[tendon])
+        parts = range(start, start + int(model.tendon_num[tendon]))
+        return {int(model.wrap_objid[at]) for at in parts if model.wrap_type[at] == joint}
 
     def tip(self, name: str) -> FloatArray:
         """Return where a site or the origin of a body is at zero, in m, shape ``(3,)``."""

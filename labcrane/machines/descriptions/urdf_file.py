@@ -1,7 +1,8 @@
 """URDF file as it is read: links with their masses, joints with their axes.
 
 Of the format of the Robot Operating System, what says how a machine moves: revolute, continuous and
-fixed joints, origins, axes, limits and inertias. A joint that a study does not name stays at zero.
+fixed joints, origins, axes, limits and inertias. A joint that a study does not name stays at zero;
+one that follows another on the way to the tip is refused.
 """
 
 import math
@@ -14,7 +15,14 @@ import numpy as np
 
 from labcrane.errors import nearest
 from labcrane.files.system import is_file
-from labcrane.machines.descriptions.chain import Axis, ChainError, LinkMesh, Mass, together
+from labcrane.machines.descriptions.chain import (
+    Axis,
+    ChainError,
+    LinkMesh,
+    Mass,
+    coupled,
+    together,
+)
 from labcrane.machines.descriptions.robot_xml import check_robot
 from labcrane.types import FloatArray
 
@@ -99,10 +107,30 @@ class UrdfFile:
             raise ChainError(
                 f"the joints on the way to {tip!r} are {', '.join(way)}; name them in this order"
             )
+        self._check_coupled(way, in_order)
         moved = self._moved(in_order)
         return [
             self._axis(called, name, moved[name], speeds, efforts) for called, name in names.items()
         ]
+
+    def _check_coupled(self, way: Sequence[str], driven: Sequence[str]) -> None:
+        """Refuse joints on the way to the tip that move as another does (``mimic``).
+
+        One that follows a joint which stays at zero stays too, unless it has an offset.
+        """
+        for name in way:
+            leader, apart, seen = name, False, {name}
+            while (mimic := self._joints[leader].find("mimic")) is not None:
+                apart |= _number(mimic.attrib, "offset", leader, 0.0) != 0.0
+                leader = mimic.get("joint", "")
+                if leader not in self._joints or leader in seen:
+                    raise ChainError(
+                        f"joint {name!r} mimics {leader!r}, which is not there or mimics it",
+                        name=name,
+                    )
+                seen.add(leader)
+            if leader != name and (name in driven or leader in driven or apart):
+                raise coupled(name, leader, "mimic")
 
     def _axis(
         self,
