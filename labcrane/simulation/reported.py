@@ -66,7 +66,7 @@ class PlannedTest:
     kind
         ``anova``: the F test of an effect, corrected after Greenhouse and Geisser. ``contrast``: a
         difference of two levels, corrected after Holm. ``trend``: participants' slopes over the
-        sequence. ``mixed``: a term of the mixed model of the logarithm.
+        sequence. ``mixed``: a term of the mixed model.
     effect
         Its factor is an effect as the report's table names it: ``group:sequence``.
     results
@@ -153,8 +153,8 @@ def plan_test(
     """
     if effect.log:
         raise ProtocolError(
-            f"log({effect.measure}): the report tests measures as they are, and the mixed model "
-            "always their logarithm; write the measure alone"
+            f"log({effect.measure}): the report tests measures as they are, and its mixed model "
+            "takes logarithms of times by itself; write the measure alone"
         )
     if kind == "anova" and (claim.kind != "difference" or effect.size is not None):
         raise ProtocolError(

@@ -464,3 +464,81 @@ def test_positions_that_cannot_be_told_from_pairs_are_not_tested_beside_them() -
     (plain,) = analyse(same, "movement_time", ["place"])
     (one,) = analyse(same.assign(pair="pair 1"), "movement_time", ["place"], beside="pair")
     assert one == plain
+
+
+SIGNED = """
+suppressMessages(library(lme4))
+d <- read.csv(commandArgs(TRUE)[1])
+say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
+d$s <- d$sequence - mean(d$sequence); d$b <- d$difficulty - mean(d$difficulty)
+for (y in c("error_along", "sparc")) {
+  d$y <- d[[y]]
+  mm <- lmer(y ~ s + b + far_side + group + phase + group:s + group:phase + (1 | participant), d,
+             control = lmerControl(optCtrl = list(ftol_abs = 1e-12, xtol_abs = 1e-12)))
+  say(y, fixef(mm)); say(paste(y, "se"), sqrt(diag(as.matrix(vcov(mm)))))
+}
+"""
+IN_R = (
+    "Intercept", "sequence", "difficulty", "far_side[T.right]", "group[T.visual]",
+    "phase[T.second]", "group[T.visual]:sequence", "group[T.visual]:phase[T.second]",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def two_groups() -> pd.DataFrame:
+    """Two groups in two phases; the second phase changes the signed error of one of them."""
+    parts = [cohort_of_36(seed).assign(phase=name) for seed, name in ((7, "first"), (8, "second"))]
+    both = pd.concat(parts, ignore_index=True)
+    visual = both["participant"].str[1:].astype(int) % 2 == 0
+    both["group"] = np.where(visual, "visual", "none")
+    dice = np.random.default_rng(3)
+    own = both["participant"].map(dict.fromkeys(sorted(set(both["participant"])), 0.0))
+    for name in sorted(set(both["participant"])):
+        own[both["participant"] == name] = dice.normal(0.0, 0.03)
+    both["error_along"] += own + 0.06 * (visual & (both["phase"] == "second"))
+    both["sparc"] = -1.8 - 0.1 * both["difficulty"] + own + dice.normal(0.0, 0.05, len(both))
+    return both
+
+
+@pytest.mark.slow
+@needs_r
+@pytest.mark.parametrize("measure", ["error_along", "sparc"])
+def test_a_measure_with_a_sign_is_modelled_whole_with_group_by_phase_as_lme4_does(
+    two_groups: pd.DataFrame, tmp_path: Path, measure: str
+) -> None:
+    path = tmp_path / "movements.csv"
+    two_groups.to_csv(path, index=False)
+    theirs = table(r(SIGNED, path))
+    model = mixed_model(two_groups, measure)
+    assert model is not None
+    assert (model.log, model.n, model.missing) == (False, len(two_groups), 0)
+    assert (two_groups[measure] <= 0.0).any()
+    assert not model.slopes, "they are alike in everybody here"
+    terms = model.terms.set_index("term").loc[list(IN_R)]
+    fixed, se = (np.array(theirs[key], float) for key in (measure, f"{measure} se"))
+    np.testing.assert_allclose(terms["estimate"], fixed, rtol=1e-3, atol=1e-6)
+    np.testing.assert_allclose(terms["se"], se, rtol=5e-3)
+    if measure == "error_along":
+        group_by_phase = terms["estimate"].iloc[-1]
+        assert group_by_phase == pytest.approx(0.06, abs=3 * terms["se"].iloc[-1])
+
+
+def test_a_time_of_0_is_kept_and_the_time_modelled_as_it_is(two_groups: pd.DataFrame) -> None:
+    few = two_groups[two_groups["participant"] <= "P006"].reset_index(drop=True)
+    zero = few.assign(reaction_time=few["movement_time"].where(few.index != 5, 0.0))
+    model = mixed_model(zero, "reaction_time")
+    assert model is not None
+    assert (model.log, model.n) == (False, len(few))
+    assert mixed_model(few.assign(reaction_time=few["movement_time"]), "reaction_time").log
+
+
+def test_groups_that_lack_a_phase_are_modelled_without_their_interaction(
+    two_groups: pd.DataFrame,
+) -> None:
+    few = two_groups[two_groups["participant"] <= "P010"]
+    model = mixed_model(few, "movement_time")
+    assert "group[T.visual]:phase[T.second]" in set(model.terms["term"])
+    lacking = few[(few["group"] == "none") | (few["phase"] == "first")]
+    model = mixed_model(lacking, "movement_time")
+    assert "phase[T.second]" in set(model.terms["term"])
+    assert "group[T.visual]:phase[T.second]" not in set(model.terms["term"])

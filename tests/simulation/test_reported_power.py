@@ -444,7 +444,12 @@ def test_cohorts_are_the_same_whoever_makes_them() -> None:
             "compares 'visual' with itself",
         ),
         ("trend", "movement_time~distance", NOTHING, "trend is over the sequence of one session"),
-        ("mixed", "log(movement_time)~group", NOTHING, "the mixed model always their logarithm"),
+        (
+            "mixed",
+            "log(movement_time)~group",
+            NOTHING,
+            "its mixed model takes logarithms of times by itself",
+        ),
         ("mixed", "speed~group", NOTHING, "movements have no 'speed'"),
     ],
 )

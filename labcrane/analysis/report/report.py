@@ -40,7 +40,7 @@ from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
 from labcrane.analysis.statistics.time_outs import time_outs
 from labcrane.analysis.statistics.time_scales import QUANTITIES, TAKEN
-from labcrane.analysis.statistics.trends import mixed_model
+from labcrane.analysis.statistics.trends import TIMES, mixed_model
 from labcrane.analysis.tables.annotations import annotations_of
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.errors import LabcraneError
@@ -483,10 +483,16 @@ def _mixed(page: Page, results: "pd.DataFrame", measure: str) -> None:
         page.say(f"No mixed model of {measure} could be fitted.")
         return
     slopes = "with" if model.slopes else "without (the data could not carry them)"
+    modelled = f"the logarithm of {measure}" if model.log else measure
+    without = f" ({model.missing} more have no value)" if model.missing else ""
+    why = ""
+    if measure in TIMES and not model.log:
+        why = " It is modelled as it is, since a value of 0 or less has no logarithm."
     page.say(
-        f"log {measure}, {model.n} movements of {model.participants} participants, {slopes} a "
-        f"slope for each participant; standard deviation over participants "
-        f"{model.participant_sd:.3g}, residual {model.residual_sd:.3g}."
+        f"Mixed model of {modelled}: {model.n} movements{without} of {model.participants} "
+        f"participants, {slopes} a slope for each participant; standard deviation over "
+        f"participants {model.participant_sd:.3g}, residual {model.residual_sd:.3g}; p are of z, "
+        f"which is too small with few participants.{why}"
     )
     page.table(f"mixed_model_{measure}", model.terms)
 

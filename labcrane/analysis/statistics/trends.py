@@ -22,6 +22,9 @@ FIXED = ("sequence", "difficulty", "far_side")
 DESIGN = ("group", "phase")
 """Further ones where a study has them; groups may learn in another way too."""
 
+TIMES = ("movement_time", "onset_to_rest", "circle_to_circle", "reaction_time", "movement_onset")
+"""How long people take is above 0 and skewed to the right: its logarithm is modelled."""
+
 
 @dataclass(frozen=True, slots=True)
 class Trend:
@@ -104,20 +107,23 @@ def holm(p: Sequence[float]) -> list[float]:
 
 @dataclass(frozen=True, slots=True)
 class MixedModel:
-    """A linear mixed model of the logarithm of a measure.
+    """A linear mixed model of a measure, or of its logarithm.
 
-    ``log measure ~ sequence + difficulty + far_side + (1 + sequence | participant)``, sequence
+    ``measure ~ sequence + difficulty + far_side + (1 + sequence | participant)``, sequence
     and difficulty centred; with groups also ``group * sequence``, with sessions or blocks
-    ``phase``.
+    ``phase``, with both ``group * phase`` where each group has each phase.
 
     Attributes
     ----------
     measure
         What was modelled.
+    log
+        Whether its logarithm was: of :data:`TIMES`, unless a value is 0 or less. Other measures are
+        modelled as they are, since they have a sign, or a value of 0 that means something.
     terms
         One row per fixed term: term, estimate, standard error, z, p.
     participant_sd
-        Standard deviation over participants of the intercept, on the log scale.
+        Standard deviation over participants of the intercept, of the logarithm if ``log``.
     residual_sd
         That of what is left.
     slopes
@@ -126,9 +132,12 @@ class MixedModel:
         Whether the fit came to its end; estimates of one that did not mean nothing.
     n, participants
         Movements and participants.
+    missing
+        Movements without a value, which are left out.
     """
 
     measure: str
+    log: bool
     terms: "pd.DataFrame"
     participant_sd: float
     residual_sd: float
@@ -136,6 +145,7 @@ class MixedModel:
     converged: bool
     n: int
     participants: int
+    missing: int
 
 
 def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
@@ -147,12 +157,14 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
     """
     import pandas as pd
 
-    data = _modelled(movements, measure)
+    data, log = _modelled(movements, measure)
     if data["participant"].nunique() < 3:  # noqa: PLR2004
         return None
     varied = [name for name in (*FIXED, *DESIGN) if name in data and data[name].nunique() > 1]
     if {"group", "sequence"} <= set(varied):
         varied.append("group:sequence")
+    if {*DESIGN} <= set(varied) and pd.crosstab(data["group"], data["phase"]).to_numpy().all():
+        varied.append("group:phase")
     formula = "y ~ " + (" + ".join(varied) or "1")
     for slopes in (True, False):
         found = _fit(formula, data, "~sequence" if slopes else "1")
@@ -171,6 +183,7 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
     )
     return MixedModel(
         measure,
+        log,
         terms,
         participant_sd=float(np.sqrt(found.cov_re.iloc[0, 0])),
         residual_sd=float(np.sqrt(found.scale)),
@@ -178,18 +191,19 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
         converged=bool(found.converged),
         n=len(data),
         participants=data["participant"].nunique(),
+        missing=len(movements) - len(data),
     )
 
 
-def _modelled(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
-    """Return what the model is fitted to: the measure's logarithm, and centred terms."""
+def _modelled(movements: "pd.DataFrame", measure: str) -> tuple["pd.DataFrame", bool]:
+    """Return what the model is fitted to, terms centred, and whether it is of the logarithm."""
     names = [*FIXED, *(name for name in DESIGN if name in movements), "participant"]
     table = movements[[measure, *names]].dropna()
-    table = table[table[measure] > 0.0]
-    data = table[names].assign(y=np.log(table[measure]))
+    log = measure in TIMES and bool((table[measure] > 0.0).all())
+    data = table[names].assign(y=np.log(table[measure]) if log else table[measure])
     for name in ("sequence", "difficulty"):
         data[name] -= data[name].mean()
-    return data
+    return data, log
 
 
 def _fit(formula: str, data: "pd.DataFrame", random: str) -> Any:
