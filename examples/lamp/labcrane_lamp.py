@@ -44,8 +44,8 @@ class LampSettings(Settings):
     shake_below: float = Field(default=0.5, ge=0.0)
     """Distance in metres below which the motor runs, the faster the closer."""
 
-    def reveals(self) -> str:
-        return "how far the tip is from the target"
+    def reveals(self) -> tuple[str, ...]:
+        return ("how far the tip is from the target",)
 
 
 class Lamp(Feedback):

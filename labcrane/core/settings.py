@@ -44,13 +44,14 @@ def read_settings(path: Path, model: type[ModelT]) -> ModelT:
 class Settings(StrictModel):
     """Base of every plugin's settings: unknown keys are errors, values never change."""
 
-    def reveals(self) -> str:
-        """Return what whoever sees or hears the component learns of the task's error.
+    def reveals(self) -> tuple[str, ...]:
+        """Return what everyone who sees or hears the component learns of the task's error.
 
-        Nothing by default. What reveals something is feedback, and belongs to the design:
-        ``labcrane check`` warns of it where it is always there, in every group.
+        A fact each, nothing by default; components that tell the same use the same words. What
+        reveals something is feedback, and belongs to the design: ``labcrane check`` asks about it
+        where it is always there, in every group, and where groups are told different facts.
         """
-        return ""
+        return ()
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
         """Return numbers that hardly anybody means, by key: ``{"limit_s": "is 0.1 s, and ..."}``.

@@ -243,8 +243,26 @@ def _of_repeats(study: Study) -> Doubts:
         for name in twice(names):
             again = len(names) - 1 - names[::-1].index(name)
             yield (*place, again), f"{key_of(place)} has {name!r} twice"
+    yield from _of_what_groups_learn(study)
+
+
+def _of_what_groups_learn(study: Study) -> Doubts:
+    """Question groups that are given the same, and those that are told different facts."""
+    told: dict[frozenset[str], str] = {}
     given: dict[frozenset[str], str] = {}
+    parts = {**study.cues, **study.sounds}
     for name, feedback in study.protocol.design.groups.items():
+        facts = frozenset(fact for each in feedback for fact in parts[each].settings.reveals())
+        if facts and facts not in told:
+            for others, group in told.items():
+                more = [*sorted(facts - others), *sorted(others - facts)]
+                yield (
+                    ("design", "groups", name),
+                    f"groups {group!r} and {name!r} are not told the same: only one of them learns "
+                    f"{' and '.join(more)}, so that the way of telling cannot be told from what is "
+                    "told",
+                )
+            told[facts] = name
         if (other := given.setdefault(frozenset(feedback), name)) != name:
             yield (
                 ("design", "groups", name),
@@ -263,7 +281,8 @@ def _of_components(study: Study) -> Doubts:
         ):
             yield (
                 place,
-                f"{part}: {choice.name} tells {told}, in every group and block; put it under "
+                f"{part}: {choice.name} tells {' and '.join(told)}, in every group and block; put "
+                "it under "
                 "feedback, where the design says who is given it",
             )
 

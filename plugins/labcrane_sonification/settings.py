@@ -41,7 +41,12 @@ class SonificationSettings(Settings):
     """Overtones above the fundamental far away and at the target, 0 to 15."""
 
     level: tuple[float, float] = (0.3, 0.3)
-    """Amplitude of the fundamental far away and at the target, 0 to 1."""
+    """Amplitude of the fundamental far away and at the target, 0 to 1, where the tone is softest;
+    see ``weighting``."""
+
+    weighting: Literal["a", "none"] = "a"
+    """``a`` lowers the tone wherever the ear hears its partials better, so that at one ``level`` it
+    is equally loud at every distance, in dB(A); ``none`` leaves the amplitude as it is."""
 
     aside: Annotated[PositiveFloat, Unit("m")] = 2.0
     """Distance to the side, in metres, at which the tone comes from one side only."""
@@ -68,6 +73,14 @@ class SonificationSettings(Settings):
     device: int | None = None
     """Number of the output device, as PortAudio counts; the system's default by default."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _former(cls, written: object, info: ValidationInfo) -> object:
+        # What was recorded without a weighting had none.
+        if was_run(info) and isinstance(written, Mapping):
+            return {"weighting": "none", **written}
+        return written
+
     @field_validator("device")
     @classmethod
     def _is_counted(cls, device: int | None, info: ValidationInfo) -> int | None:
@@ -78,8 +91,13 @@ class SonificationSettings(Settings):
             )
         return device
 
-    def reveals(self) -> str:
-        return "how far the tip is from the target"
+    def reveals(self) -> tuple[str, ...]:
+        told = ["how far the tip is from the target"]
+        if self.pan != "none":
+            told.append("on which side the target is")
+        if self.silent_after_s is not None:
+            told.append("whether the tip is inside the target")
+        return tuple(told)
 
     def provides(self, machine: Machine) -> Names:
         return {"object": ()}

@@ -1,7 +1,9 @@
 """Tone as a pure function of where the tip is."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -53,13 +55,51 @@ def tone(settings: SonificationSettings, distance: float, aside: float, inside_s
     few, many = settings.overtones
     quiet, loud = settings.level
     silent = settings.silent_after_s is not None and inside_s >= max(settings.silent_after_s, 1e-9)
+    pitch = low * (high / low) ** near
+    overtones = float(round(few + (many - few) * near))
+    level = quiet + (loud - quiet) * near
+    if settings.weighting == "a":
+        level *= softest(settings.pitch_hz, settings.overtones) / heard(pitch, overtones)
     side = {"towards": -1.0, "away": 1.0, "none": 0.0}[settings.pan] * aside / settings.aside
     return Tone(
-        pitch=low * (high / low) ** near,
-        overtones=float(round(few + (many - few) * near)),
-        level=0.0 if silent else quiet + (loud - quiet) * near,
+        pitch=pitch,
+        overtones=overtones,
+        level=0.0 if silent else level,
         pan=max(-1.0, min(1.0, side)),
     )
+
+
+STEPS = 400
+"""Distances at which the softest tone is looked for."""
+
+
+def a_weight(hertz: FloatArray) -> FloatArray:
+    """Return the A-weighting of frequencies as a factor of amplitude; 1 at 1 kHz.
+
+    IEC 61672-1, annex E.
+    """
+    squared = np.square(hertz)
+    poles = (20.598997, 107.65265, 737.86223, 12194.217)
+    first, second, third, fourth = (squared + pole**2 for pole in poles)
+    response = poles[3] ** 2 * squared**2 / (first * np.sqrt(second * third) * fourth)
+    return np.asarray(1.2588966 * response)  # +2.00 dB
+
+
+def heard(pitch: float, overtones: float) -> float:
+    """Return the A-weighted amplitude of a tone whose fundamental has an amplitude of 1.
+
+    That of a sine of 1 kHz that is as loud: powers of partials add.
+    """
+    numbers = np.arange(1.0, 2.0 + overtones)
+    return float(np.linalg.norm(a_weight(pitch * numbers) / numbers))
+
+
+@lru_cache(maxsize=16)
+def softest(pitch_hz: tuple[float, float], overtones: tuple[int, int]) -> float:
+    """Return what is heard of the tone where it is softest, its fundamental having 1."""
+    (low, high), (few, many) = pitch_hz, overtones
+    ways: Sequence[float] = np.linspace(0.0, 1.0, STEPS + 1).tolist()
+    return min(heard(low * (high / low) ** at, round(few + (many - few) * at)) for at in ways)
 
 
 def gains(pan: float) -> tuple[float, float]:

@@ -47,8 +47,8 @@ class SphereSettings(Settings):
     opacity: float = Field(default=0.45, gt=0.0, le=1.0)
     """1 hides what is behind it."""
 
-    def reveals(self) -> str:
-        return "how far the tip is from the target"
+    def reveals(self) -> tuple[str, ...]:
+        return ("how far the tip is from the target",)
 
     def provides(self, machine: Machine) -> Names:
         return {"object": ["sphere"]}

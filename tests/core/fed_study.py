@@ -6,7 +6,7 @@ FED = SHORT.replace(
     "sessions:",
     """feedback:
   ball: {use: sphere}
-  tone: {use: sonification, far: 3.0}
+  tone: {use: sonification, far: 3.0, pan: none, silent_after_s: null}
 design:
   groups: {none: [], visual: [ball], auditory: [tone], both: [ball, tone]}
 sessions:""",

@@ -49,6 +49,11 @@ BALL = "feedback: {ball: {use: sphere}, tone: {use: sphere}}\nsessions:"
 SEEN = f"views: {{front: {{use: view}}}}\n{BALL}"
 GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
 
+UNEQUAL = (
+    "feedback: {ball: {use: sphere}, tone: {use: sonification}}\n"
+    "design: {groups: {none: [], seen: [ball], heard: [tone], both: [ball, tone]}}\n"
+)
+
 MAP = "map: {slew: -left.x, elbow: left.y, wrist: -right.x, shoulder: -right.y}"
 UNLIKE = [
     (
@@ -120,6 +125,8 @@ UNLIKE = [
         ([("sessions:", GROUPS.replace("none: []", "all: [ball]")),
           (BLOCK, BLOCK.replace("pairs", "feedback: group, pairs"))],
          "design.groups.ball", "groups 'all' and 'ball' are given the same feedback"),
+        ([("sessions:", f"{UNEQUAL}sessions:"), (BLOCK, BLOCK.replace("pairs", "feedback: group, pairs"))],
+         "design.groups.heard", "only one of them learns on which side the target is and whether the tip is inside the target, so"),
         ([(BLOCK, BLOCK.replace("pairs", "ask: [nasa_tlx, nasa_tlx], pairs"))],
          "sessions.1.steps.1.block.ask.2", "has 'nasa_tlx' twice"),
         ([("machine: ch8", "operator: {use: simulated_operator, reaction_sd: 1e300}\nmachine: ch8")],

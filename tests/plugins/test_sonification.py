@@ -18,7 +18,8 @@ from labcrane.testing import TARGETS, FeedbackContract, ch8, make_run, make_targ
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.sonification import Sonification
 from labcrane_sonification.synth import Synth, offline_server
-from labcrane_sonification.tone import Tone, gains, tone
+from labcrane_sonification.tone import Tone, a_weight, gains, tone
+from labcrane_sphere.settings import SphereSettings
 
 RATE = 48000
 BLOCKS = (64, 128, 256, 512, 1024)
@@ -69,7 +70,7 @@ def test_exchanged_pitches_are_the_other_polarity() -> None:
 
 
 def test_overtones_and_level_go_from_far_to_near() -> None:
-    settings = SonificationSettings(far=5.0, overtones=(0, 5), level=(0.1, 0.6))
+    settings = SonificationSettings(far=5.0, overtones=(0, 5), level=(0.1, 0.6), weighting="none")
     tones = [tone(settings, float(distance), 0.0, 0.0) for distance in range(6)]
     assert [t.overtones for t in tones] == [5, 4, 3, 2, 1, 0]
     np.testing.assert_allclose([t.level for t in tones], [0.6, 0.5, 0.4, 0.3, 0.2, 0.1])
@@ -257,3 +258,48 @@ def test_an_unknown_device_is_refused(tmp_path: Path) -> None:
 
 def test_a_missing_jack_server_is_told_so() -> None:
     assert "in blocks of 256 samples; start a JACK server first" in refusal(driver="jack")
+
+
+def test_the_weighting_is_that_of_the_standards_table() -> None:
+    """IEC 61672-1, table 3, in dB to one decimal."""
+    table = {63.0957: -26.2, 125.893: -16.1, 251.189: -8.6, 501.187: -3.2, 1000.0: 0.0,
+             1995.26: 1.2, 3981.07: 1.0, 7943.28: -1.1, 15848.9: -6.6}  # fmt: skip
+    ours = 20.0 * np.log10(a_weight(np.array(list(table))))
+    np.testing.assert_allclose(ours, list(table.values()), atol=0.051)
+
+
+def level_of(sound: np.ndarray) -> float:
+    """Return the A-weighted level of a sound in dB, from its spectrum and the standard's table."""
+    hertz = [31.6228, 63.0957, 125.893, 251.189, 501.187, 1000.0, 1995.26, 3981.07, 7943.28]
+    decibels = [-39.4, -26.2, -16.1, -8.6, -3.2, 0.0, 1.2, 1.0, -1.1]
+    power = np.abs(np.fft.rfft(sound * np.hanning(len(sound)))) ** 2
+    found = np.fft.rfftfreq(len(sound), 1.0 / RATE)[1:]
+    weights = np.interp(np.log(found), np.log(hertz), decibels)
+    return float(10.0 * np.log10(np.sum(power[1:] * 10.0 ** (weights / 10.0))))
+
+
+def test_at_one_level_the_tone_is_equally_loud_at_every_distance() -> None:
+    levels = {}
+    for weighting in ("a", "none"):
+        with a_synth(weighting=weighting) as synth:
+            settings = SonificationSettings(weighting=weighting)
+            for distance in (4.0, 3.1, 2.3, 1.7, 0.9, 0.4, 0.0):
+                wanted = tone(settings, distance, 0.0, 0.0)
+                assert 0.0 < wanted.level <= 0.3001, "it is never more than the level"
+                synth.sound(wanted)
+                blocks(synth, 0.1)
+                levels.setdefault(weighting, []).append(level_of(blocks(synth, 0.4)[:, 0]))
+    assert np.ptp(levels["a"]) < 1.0  # the table is read between its octaves
+    assert np.ptp(levels["none"]) > 10.0
+
+
+def test_what_was_recorded_without_a_weighting_had_none() -> None:
+    was_run = {"recorded": True}
+    assert SonificationSettings.model_validate({}, context=was_run).weighting == "none"
+    assert SonificationSettings.model_validate({}).weighting == "a"
+
+
+def test_the_shipped_groups_of_sphere_and_tone_are_told_the_same() -> None:
+    tone_alone = SonificationSettings(pan="none", silent_after_s=None)
+    assert tone_alone.reveals() == SphereSettings().reveals()
+    assert set(SonificationSettings().reveals()) > set(tone_alone.reveals())

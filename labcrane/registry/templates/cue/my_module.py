@@ -24,9 +24,9 @@ class MyPartSettings(Settings):
     colour: tuple[Share, Share, Share] = (1.0, 0.8, 0.1)
     """Red, green and blue, each 0 to 1."""
 
-    def reveals(self) -> str:
-        # What it tells of the task's error: `labcrane check` asks who is given it. "" for nothing.
-        return "where the target is, and how far"
+    def reveals(self) -> tuple[str, ...]:
+        # What it tells of the task's error: `labcrane check` asks who is given it. () for nothing.
+        return ("how far the tip is from the target", "where the target is")
 
 
 class MyPart(Cue):

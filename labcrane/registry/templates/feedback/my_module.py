@@ -27,9 +27,9 @@ class MyPartSettings(Settings):
     far: PositiveFloat = 4.0
     """Distance of tip and target, in metres, from which on it is dark."""
 
-    def reveals(self) -> str:
-        # What it tells of the task's error: `labcrane check` asks who is given it. "" for nothing.
-        return "how far the tip is from the target"
+    def reveals(self) -> tuple[str, ...]:
+        # What it tells of the task's error: `labcrane check` asks who is given it. () for nothing.
+        return ("how far the tip is from the target",)
 
 
 class MyPart(Feedback):
