@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from labcrane.core.items import Item
+from labcrane.core.items import Item, in_order
 from labcrane.core.records import Event, Value
 from labcrane.core.roles import Questionnaire
 
@@ -15,10 +15,11 @@ class Sheet:
 
     name: str
     questionnaire: Questionnaire
+    order: str = ""
 
     def items(self) -> Sequence[Item]:
-        """Return its questions."""
-        return self.questionnaire.items()
+        """Return its questions, in the order of the record."""
+        return in_order(self.questionnaire.items(), self.order)
 
     @staticmethod
     def read(item: Item, said: str) -> float | str | None:
@@ -49,7 +50,8 @@ class Sheets:
         if event.name == "questionnaire.start":
             name = str(event.data["questionnaire"])
             asked = self.questionnaires.get(name)
-            return Sheet(name, asked) if asked else None
+            order = str(event.data.get("order", ""))
+            return Sheet(name, asked, order) if asked else None
         return None if event.name == "questionnaire.end" else sheet
 
 

@@ -1,6 +1,7 @@
 """Items of a questionnaire, and what may be answered."""
 
 import math
+import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -37,6 +38,12 @@ class Item:
         Words at the ends of a scale.
     choices, labels
         Of a choice: what is recorded, and what is shown for each; the same by default.
+    words
+        Of a scale: numbers, and what is written at each.
+    numbered
+        Whether a scale shows its numbers.
+    card
+        Whether it is one of those that are asked in an order drawn by chance.
     required
         Whether the questionnaire cannot be handed in before this is answered, or declined.
     """
@@ -52,6 +59,9 @@ class Item:
     choices: tuple[str, ...] = ()
     required: bool = True
     labels: tuple[str, ...] = ()
+    words: tuple[tuple[float, str], ...] = ()
+    numbered: bool = True
+    card: bool = False
 
     @property
     def takes(self) -> str:
@@ -61,7 +71,10 @@ class Item:
         if self.kind == "text":
             return "words"
         span = f"{self.lowest:g} to {self.highest:g}"
-        return f"{span} in steps of {self.step:g}" if self.step else span
+        if self.step:
+            span += f" in steps of {self.step:g}"
+        said = ", ".join(f"{at:g} {words}" for at, words in self.words)
+        return f"{span}: {said}" if said else span
 
     def check(self, answer: object) -> Value:
         """Return an answer as it is recorded; None declines the question.
@@ -105,6 +118,20 @@ class Score:
     name: str
     lowest: float
     highest: float
+
+
+def shuffled(items: Sequence[Item], seed: int) -> list[Item]:
+    """Return items with the cards among them in an order drawn by chance; the others stay."""
+    cards = [item for item in items if item.card]
+    random.Random(seed).shuffle(cards)  # noqa: S311 - nothing secret
+    drawn = iter(cards)
+    return [next(drawn) if item.card else item for item in items]
+
+
+def in_order(items: Sequence[Item], order: str) -> Sequence[Item]:
+    """Return items in the order of their names in ``order``; as they come where it is empty."""
+    names = order.split()
+    return sorted(items, key=lambda item: names.index(item.name)) if names else items
 
 
 def _written(answer: str) -> str:

@@ -6,7 +6,7 @@ import random
 import re
 from collections.abc import Iterator, Mapping
 
-from labcrane.core.items import AnswerError, Item
+from labcrane.core.items import AnswerError, Item, shuffled
 from labcrane.core.records import Trial, Value
 from labcrane.core.roles import Questionnaire
 from labcrane.design.plan import SessionPlan
@@ -41,6 +41,8 @@ class QuestionnaireForm:
         Where in the session it is asked: step, and trial if it follows one.
     answered
         What was answered before the session stopped.
+    seed
+        From which the order of its cards is drawn.
 
     Attributes
     ----------
@@ -54,17 +56,23 @@ class QuestionnaireForm:
         questionnaire: Questionnaire,
         about: Mapping[str, Value],
         answered: Mapping[str, Value] | None = None,
+        seed: int = 0,
     ) -> None:
         self.over = False
         self._questionnaire = questionnaire
         self._items = {item.name: item for item in questionnaire.items()}
+        self._seed = seed
         self._about = {"questionnaire": name, **about}
         self._answers: dict[str, Value] = dict(answered or {})
 
     def begin(self) -> Said:
         """Return the event with which it begins."""
         kept = json.dumps(self._answers, ensure_ascii=False)
-        return START, {**self._about, "title": self._questionnaire.title, "kept": kept}
+        about = {**self._about, "title": self._questionnaire.title, "kept": kept}
+        items = list(self._items.values())
+        if any(item.card for item in items):  # whoever shows it follows the record
+            about["order"] = " ".join(item.name for item in shuffled(items, self._seed))
+        return START, about
 
     def take(self, text: str, by: str) -> Said:
         """Take an answer, as JSON of questionnaire, item and value; return what is to be said."""
@@ -195,10 +203,12 @@ class QuestionnaireRun:
         about: dict[str, Value] = {"step": step}
         if after is not None:
             about["trial"] = after.number
-        self._form = QuestionnaireForm(name, study.questionnaires[name], about, answered)
         self._name = name
         self._rules = [rule for rule in study.protocol.stop_rules if rule.questionnaire == name]
-        self._seed = derive("answers", after.seed if after else plan.seed, step, name)
+        drawn = (after.seed if after else plan.seed, step, name)
+        self._seed = derive("answers", *drawn)
+        asked = study.questionnaires[name]
+        self._form = QuestionnaireForm(name, asked, about, answered, derive("cards", *drawn))
         self._known = study.answers.get(name, {})
         self.alarming = False
 

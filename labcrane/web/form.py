@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from labcrane.core.items import Item
+from labcrane.core.items import Item, in_order
 from labcrane.core.records import Value
 from labcrane.session.commands import Order
 from labcrane.web.page import PageContext
@@ -75,7 +75,7 @@ class Form:
             self._refreshers.append(lambda: said.set_text("" if session.consent else calm))
             return
         questionnaire = self._context.study.questionnaires[name]
-        items = list(questionnaire.items())
+        items = list(in_order(questionnaire.items(), session.order))
         ui.label(questionnaire.title).classes("form-title").props(HEADING)
         self._progress(items)
         cards = [self._item(name, item) for item in items]
@@ -147,8 +147,10 @@ class Form:
                 )
             elif item.kind == "scale" and item.step and _ticks(item) <= MOST_TICKS:
                 values = [item.lowest + item.step * tick for tick in range(_ticks(item))]
-                self._choices(name, item, {value: f"{value:g}" for value in values})
+                self._choices(name, item, {value: _label(item, value) for value in values})
             else:
+                if item.words:
+                    self._choices(name, item, {at: _label(item, at) for at, _ in item.words})
                 self._field(name, item)
             with ui.element("div").classes("form-below"):
                 ui.button(
@@ -170,14 +172,18 @@ class Form:
                 ui.label(item.right)
         fine = " form-fine" if len(values) > FEW_TICKS else ""
         scale = f"form-scale{fine}" if item.kind == "scale" else "form-choices"
+        if item.words:
+            scale = "form-steps"
         with ui.element("div").classes(scale):
             for value, label in values.items():
                 button = ui.button(
                     label, on_click=lambda value=value: self._answer(name, item, value)
                 )
                 button.props("outline no-caps color=primary aria-pressed=false")
-                ident = value if isinstance(value, str) else label
+                ident = value if isinstance(value, str) else f"{value:g}"
                 button.props(f'id="{item.name}-{ident}"')
+                if not label:
+                    button.props(f'aria-label="{ident}"')
                 self._refreshers.append(self._marking(button, item, value))
 
     def _marking(self, button: "ui.button", item: Item, value: Value) -> Callable[[], None]:
@@ -257,6 +263,12 @@ class Form:
             item.name: item for item in self._context.study.questionnaires[session.form].items()
         }
         return self._words.refused(session.refusal, items.get(session.refused_item))
+
+
+def _label(item: Item, value: float) -> str:
+    """Return what stands at a step of a scale: its number and words, or nothing."""
+    said = dict(item.words).get(value, "")
+    return f"{value:g}  {said}".strip() if item.numbered else said
 
 
 def _ticks(item: Item) -> int:

@@ -91,8 +91,9 @@ class SessionView:
     things
         What stands around the machine in the running trial, as of
         :func:`labcrane.machines.scene_codec.read_placed`; empty for nothing.
-    form, answers, refusal
-        The questionnaire that is asked, its recorded answers, and the last refusal.
+    form, order, answers, refusal
+        The questionnaire that is asked, the names of its questions in their order where that was
+        drawn, its recorded answers, and the last refusal.
     form_version
         Grows with every questionnaire.
     streams
@@ -125,6 +126,7 @@ class SessionView:
         self.things = ""
         self.counts: Counter[str] = Counter()
         self.form: str | None = None
+        self.order = ""
         self.form_version = 0
         self.answers: dict[str, Value] = {}
         self.refusal = ""
@@ -223,7 +225,7 @@ class SessionView:
     def _form(self, what: str, data: Mapping[str, Value]) -> None:
         match what:
             case "start":
-                self.form = str(data["questionnaire"])
+                self.form, self.order = str(data["questionnaire"]), str(data.get("order", ""))
                 self.answers = json.loads(str(data["kept"]))
                 self.refusal = ""
                 self.form_version += 1

@@ -9,9 +9,9 @@ from labcrane_questionnaires.settings import (
     DemographicsSettings,
     FreeSettings,
     LabTextSettings,
-    LanguageSettings,
     RatingSettings,
     TlxSettings,
+    TranslatedSettings,
 )
 
 labcrane_api = 1
@@ -24,10 +24,10 @@ def labcrane_questionnaires() -> list[Offer[Questionnaire]]:
 
         return NasaTlx(settings)
 
-    def sus(settings: LanguageSettings, machine: Machine) -> Questionnaire:
+    def sus(settings: TranslatedSettings, machine: Machine) -> Questionnaire:
         from labcrane_questionnaires.sus import Sus
 
-        return Sus()
+        return Sus(settings)
 
     def rating(name: str) -> Offer[Questionnaire]:
         def build(settings: RatingSettings, machine: Machine) -> Questionnaire:
@@ -49,7 +49,7 @@ def labcrane_questionnaires() -> list[Offer[Questionnaire]]:
 
     return [
         offer("nasa_tlx", TlxSettings, tlx),
-        offer("sus", LanguageSettings, sus),
+        offer("sus", TranslatedSettings, sus),
         rating("subjective_accuracy"),
         rating("situational_awareness"),
         offer("demographics", DemographicsSettings, demographics),

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from labcrane import ProtocolError, Questionnaire
 from labcrane.core import Item
-from labcrane_questionnaires.settings import LabText
+from labcrane_questionnaires.settings import LabText, unstepped
 
 
 class LabScale(Questionnaire):
@@ -21,12 +21,23 @@ class LabScale(Questionnaire):
                 f"{self.usual_title} has {len(self.names)} items, and the lab's file has "
                 f"{len(text.items)}; give them in the order of the publication"
             )
+        lowest, highest, step = self.span
+        if wrong := unstepped(text.words, lowest, highest, step):
+            raise ProtocolError(f"{self.usual_title} {wrong}")
         self.title = text.title or self.usual_title
         self.rights = text.rights
         self._text = text
 
     def items(self) -> Sequence[Item]:
         return [
-            Item(name, words, "scale", *self.span, left=self._text.left, right=self._text.right)
-            for name, words in zip(self.names, self._text.items, strict=True)
+            Item(
+                name,
+                asked,
+                "scale",
+                *self.span,
+                left=self._text.left,
+                right=self._text.right,
+                words=tuple(self._text.words.items()),
+            )
+            for name, asked in zip(self.names, self._text.items, strict=True)
         ]

@@ -7,6 +7,9 @@ from labcrane.core import Answers, Score, numeric_answers
 from labcrane_questionnaires.lab_scale import LabScale
 from labcrane_questionnaires.settings import LabText
 
+BEYOND = 20.0
+"""Largest rating on CR10 that is taken; twice the strongest that somebody knew before."""
+
 
 class _Slot(LabScale):
     """One rating, which is its own score."""
@@ -18,11 +21,14 @@ class _Slot(LabScale):
 
 
 class BorgCr10(_Slot):
-    """Borg's category-ratio scale: 0 to 10 in halves."""
+    """Borg's category-ratio scale: any number from 0, with words up to 10.
+
+    Decimals belong to it, and numbers above 10 where something is stronger than ever before.
+    """
 
     usual_title = "Borg CR10"
-    span = (0.0, 10.0, 0.5)
-    scores = (Score("rating", 0.0, 10.0),)
+    span = (0.0, BEYOND, 0.0)
+    scores = (Score("rating", 0.0, BEYOND),)
 
 
 class BorgRpe(_Slot):

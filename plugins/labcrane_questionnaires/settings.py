@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_v
 
 from labcrane import Machine, ProtocolError, Settings
 from labcrane.core import (
+    AnswerError,
     Item,
     Names,
     Once,
@@ -19,28 +20,28 @@ from labcrane.core import (
     was_run,
 )
 
+SIX = 6
+"""Scales of the task load index."""
+
 NAME = r"^[a-z][a-z0-9_]*$"
 
 
 STEP_TOLERANCE = 1e-6
 
 
+def unstepped(words: Mapping[float, str], lowest: float, highest: float, step: float) -> str:
+    """Return which words stand at no step of a scale; nothing mostly."""
+    scale = Item("scale", "", "scale", lowest, highest, step)
+    for at in words:
+        try:
+            scale.check(float(at))
+        except AnswerError:
+            return f"has words at {at:g}, and takes {scale.takes}"
+    return ""
+
+
 def _twice(names: Sequence[str]) -> list[str]:
     return [each for each in names if names.count(each) > 1]
-
-
-class LanguageSettings(Settings):
-    """Of a questionnaire whose words are fixed."""
-
-    language: Literal["en"] = "en"
-    """The language in which it asks."""
-
-
-class TlxSettings(LanguageSettings):
-    """Of the NASA task load index."""
-
-    weighted: bool = False
-    """Whether the fifteen pairs are asked too, for the weighted score."""
 
 
 class RatingSettings(Settings):
@@ -92,11 +93,80 @@ class LabText(Settings):
     right: str = ""
     """Words at the highest end of every scale."""
 
+    words: dict[float, str] = Field(default_factory=dict)
+    """What is written at steps of every scale, as the publication has it: ``{0: none, 1: slight}``;
+    the page then shows the scale as a list."""
+
 
 def _only_the_file(schema: dict[str, Any]) -> None:
     """Leave out what is read from the file: nobody writes it into a protocol."""
     del schema["properties"]["text"]
     schema["required"].remove("text")
+
+
+class TlxText(LabText):
+    """The task load index in another language."""
+
+    performance: tuple[str, str]
+    """Words at the ends of the scale of performance, from good to poor."""
+
+    pair: str
+    """What each of the pairs is asked by, with {one} and {other} where the scales' titles stand."""
+
+    @field_validator("items")
+    @classmethod
+    def _are_six(cls, items: tuple[str, ...]) -> tuple[str, ...]:
+        if len(items) != SIX or not all(": " in item for item in items):
+            raise ValueError(
+                "the six scales are needed, mental, physical and temporal demand, performance, "
+                "effort and frustration, each as its title, a colon and its definition"
+            )
+        return items
+
+    @field_validator("pair")
+    @classmethod
+    def _names_both(cls, pair: str) -> str:
+        if "{one}" not in pair or "{other}" not in pair:
+            raise ValueError("it must have {one} and {other} in the places of the scales' titles")
+        return pair
+
+
+def _perhaps_the_file(schema: dict[str, Any]) -> None:
+    """Leave out what is read from the file."""
+    del schema["properties"]["text"]
+
+
+class TranslatedSettings(Settings):
+    """Of a questionnaire that comes in English, and in whatever language the lab has a file of."""
+
+    model_config = ConfigDict(json_schema_extra=_perhaps_the_file)
+
+    language: Literal["en"] = "en"
+    """The language in which it asks without a file."""
+
+    file: StudyPath | None = None
+    """YAML file with a translation, beside the protocol: rights, items, and perhaps title, left,
+    right and words."""
+
+    text: LabText | None = None
+    """What the file holds; read from it."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, given: Any, info: ValidationInfo) -> Any:
+        if not (isinstance(given, dict) and isinstance(given.get("file"), str)):
+            return given
+        return given if "text" in given else {**given, "text": _lab_file(given["file"], info)}
+
+
+class TlxSettings(TranslatedSettings):
+    """Of the NASA task load index."""
+
+    weighted: bool = False
+    """Whether the fifteen pairs are asked too, for the weighted score."""
+
+    text: TlxText | None = None
+    """What the file holds; read from it."""
 
 
 class LabTextSettings(Settings):
@@ -163,6 +233,9 @@ class QuestionSettings(Settings):
     right: str = ""
     """Words at the highest end of a scale."""
 
+    words: dict[float, str] = Field(default_factory=dict)
+    """What is written at steps of a scale: ``{0: never, 5: now and then, 10: always}``."""
+
     choices: tuple[str, ...] = ()
     """Of a choice."""
 
@@ -195,6 +268,10 @@ class QuestionSettings(Settings):
                 f"{self.highest:g}; write a highest above the lowest",
                 at=("highest" if "highest" in self.model_fields_set else "lowest",),
             )
+        if self.words and self.kind != "scale":
+            raise WrongKey(f"question {self.name!r} is no scale and has words", at=("words",))
+        if wrong := unstepped(self.words, self.lowest, self.highest, self.step):
+            raise WrongKey(f"question {self.name!r} {wrong}", at=("words",))
         return self
 
     def doubt(self) -> str:
@@ -216,7 +293,7 @@ class QuestionSettings(Settings):
 
     def item(self) -> Item:
         """Return it as the item it is."""
-        return Item(**self.model_dump())
+        return Item(**{**self.model_dump(), "words": tuple(self.words.items())})
 
 
 def _or_in_the_file(schema: dict[str, Any]) -> None:

@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 
-from labcrane import Questionnaire
+from labcrane import ProtocolError, Questionnaire
 from labcrane.core import Answers, Item, Score, numeric_answers
+from labcrane_questionnaires.settings import LabText, TranslatedSettings
 
 STATEMENTS = (
     "I think that I would like to use this system frequently.",
@@ -17,6 +18,13 @@ STATEMENTS = (
     "I felt very confident using the system.",
     "I needed to learn a lot of things before I could get going with this system.",
 )
+ENGLISH = LabText(
+    title="System usability scale",
+    rights="Digital Equipment Corporation 1986; John Brooke leaves its use free, with a citation",
+    items=STATEMENTS,
+    left="Strongly disagree",
+    right="Strongly agree",
+)
 NAMES = tuple(f"statement_{number}" for number in range(1, len(STATEMENTS) + 1))
 
 
@@ -27,14 +35,23 @@ class Sus(Questionnaire):
     times. A missing answer makes the score NaN.
     """
 
-    title = "System usability scale"
-    rights = "Digital Equipment Corporation 1986; John Brooke leaves its use free, with a citation"
     scores = (Score("total", 0.0, 100.0),)
 
+    def __init__(self, settings: TranslatedSettings) -> None:
+        text = settings.text or ENGLISH
+        if len(text.items) != len(NAMES):
+            raise ProtocolError(
+                f"SUS has {len(NAMES)} statements, and the lab's file has {len(text.items)}"
+            )
+        self.title, self.rights = text.title or ENGLISH.title, text.rights
+        self._text = text
+
     def items(self) -> Sequence[Item]:
+        ends = (self._text.left, self._text.right)
+        words = tuple(self._text.words.items())
         return [
-            Item(name, text, "scale", 1.0, 5.0, 1.0, "Strongly disagree", "Strongly agree")
-            for name, text in zip(NAMES, STATEMENTS, strict=True)
+            Item(name, asked, "scale", 1.0, 5.0, 1.0, *ends, words=words)
+            for name, asked in zip(NAMES, self._text.items, strict=True)
         ]
 
     def score(self, answers: Answers) -> Mapping[str, float]:

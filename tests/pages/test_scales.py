@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from faults.sessions import wait_for
-from pages.room import text
+from pages.room import photograph, text
 from pages.test_states import Told, opened, pages
 from PIL import Image
 from selenium import webdriver
@@ -98,3 +98,42 @@ def test_the_bar_of_answers_is_as_full_as_there_are_answers(
             picture = np.asarray(Image.open(io.BytesIO(bar.screenshot_as_png)).convert("L"), float)
             middle = picture[len(picture) // 2, 2:-2]
             assert (middle < 160.0).mean() == pytest.approx(done / len(items), abs=0.02)
+
+
+WORDED = """\
+  worded:
+    use: free
+    title: Sleepiness
+    questions:
+      - name: rating
+        text: How sleepy?
+        lowest: 1
+        highest: 9
+        words:
+          1: extremely alert
+          5: neither alert nor sleepy
+          9: very sleepy, great effort to keep awake, fighting sleep all the time
+"""
+
+
+def test_a_scale_whose_steps_have_words_is_a_list_of_them(
+    tmp_path: Path, browser: webdriver.Chrome
+) -> None:
+    with pages(tmp_path, WORDED) as told:
+        asked(told, browser, "worded")
+        for width in WIDTHS:
+            sized(browser, width)
+            steps = browser.find_elements(By.CSS_SELECTOR, ".form-steps button")
+            assert [each.text.split(None, 1)[0] for each in steps] == [*"123456789"]
+            assert "neither alert nor sleepy" in steps[4].text
+            boxes = [each.rect for each in steps]
+            assert len({box["x"] for box in boxes}) == 1
+            assert all(box["x"] >= 0 and box["x"] + box["width"] <= width for box in boxes)
+            below = zip(boxes[1:], boxes, strict=False)
+            assert all(low["y"] >= high["y"] + high["height"] for low, high in below)
+            wide = browser.execute_script(
+                "return [...document.querySelectorAll('.form-steps button')].filter("
+                "e => e.scrollWidth > e.clientWidth + 1).length"
+            )
+            assert wide == 0, f"words are cut at {width} px"
+        photograph(browser, "worded")

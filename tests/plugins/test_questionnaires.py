@@ -10,7 +10,9 @@ from rehearsal import SHORT, ScriptedConsole, a_study
 
 from labcrane import ProtocolError, Questionnaire
 from labcrane.core import AnswerError, Item
+from labcrane.core.items import in_order
 from labcrane.replay import replay_session
+from labcrane.session.questionnaire import QuestionnaireForm
 from labcrane.session.session import Visit, run
 from labcrane.testing import QuestionnaireContract
 from labcrane_questionnaires.demographics import Demographics
@@ -24,10 +26,12 @@ from labcrane_questionnaires.settings import (
     LabText,
     RatingSettings,
     TlxSettings,
+    TranslatedSettings,
 )
 from labcrane_questionnaires.ssq import Ssq
 from labcrane_questionnaires.sus import NAMES, Sus
-from labcrane_questionnaires.tlx import PAIRS, SCALES, NasaTlx
+from labcrane_questionnaires.tlx import NAMES as SCALES
+from labcrane_questionnaires.tlx import PAIRS, NasaTlx
 
 
 def a_lab_text(items: int) -> LabText:
@@ -37,7 +41,7 @@ def a_lab_text(items: int) -> LabText:
 BUILT = {
     "nasa_tlx": NasaTlx(TlxSettings()),
     "tlx weighted": NasaTlx(TlxSettings(weighted=True)),
-    "sus": Sus(),
+    "sus": Sus(TranslatedSettings()),
     "ssq": Ssq(a_lab_text(16)),
     "sart": Sart(a_lab_text(10)),
     "subjective_accuracy": Rating("subjective_accuracy", RatingSettings()),
@@ -257,3 +261,111 @@ def test_a_session_is_replayed_without_the_file_of_its_questions(tmp_path: Path)
     )
     file.unlink()
     assert replay_session(path, 1).difference is None
+
+
+WORDED = (
+    "rights: a licence\nitems: [How sleepy?]\nwords: {1: wide awake, 5: neither, 9: fighting it}\n"
+)
+
+
+def from_file(folder: Path, use: str, words: str, **settings: object) -> Questionnaire:
+    """Build one as a study with the lab's file does."""
+    (folder / "words.yaml").write_text(words)
+    more = "".join(f", {key}: {json.dumps(value)}" for key, value in settings.items())
+    asked = f"questionnaires: {{q: {{use: {use}, file: words.yaml{more}}}}}\nsessions:"
+    steps = "    steps:\n      - questionnaire: q"
+    text = SHORT.replace("sessions:", asked).replace("    steps:", steps)
+    return a_study(folder, text).questionnaires["q"]
+
+
+def test_the_words_of_the_publication_stand_at_their_steps(tmp_path: Path) -> None:
+    (item,) = from_file(tmp_path, "kss", WORDED).items()
+    assert item.words == ((1.0, "wide awake"), (5.0, "neither"), (9.0, "fighting it"))
+    assert item.takes == "1 to 9 in steps of 1: 1 wide awake, 5 neither, 9 fighting it"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [("words: {1: awake, 10: asleep}", "Karolinska sleepiness scale has words at 10, and takes 1"),
+     ("words: {1.5: awake}", "has words at 1.5, and takes 1 to 9 in steps of 1")],
+)  # fmt: skip
+def test_words_at_no_step_are_refused(tmp_path: Path, words: str, said: str) -> None:
+    with pytest.raises(ProtocolError, match=said):
+        from_file(tmp_path, "kss", f"rights: x\nitems: [How sleepy?]\n{words}\n")
+    question = {"name": "a", "text": "A", "words": {0: "never", 11: "always"}}
+    with pytest.raises(ValidationError, match="'a' has words at 11, and takes 0 to 10"):
+        FreeSettings.model_validate({"title": "T", "questions": [question]})
+    with pytest.raises(ValidationError, match="'a' is no scale and has words"):
+        FreeSettings.model_validate({"title": "T", "questions": [{**question, "kind": "text"}]})
+
+
+def test_cr10_takes_decimals_and_numbers_above_ten(tmp_path: Path) -> None:
+    words = "rights: x\nitems: [How strong?]\nwords: {0: nothing, 0.3: a trace, 10: extreme}\n"
+    scale = from_file(tmp_path, "borg_cr10", words)
+    (item,) = scale.items()
+    for rating in (0.0, 0.3, 2.8, 10.0, 12.5):
+        assert scale.score({"rating": item.check(rating)})["rating"] == rating
+    for wrong in (-0.1, 20.1):
+        with pytest.raises(AnswerError, match=r"takes 0 to 20: 0 nothing, 0\.3 a trace"):
+            item.check(wrong)
+
+
+def test_the_load_index_defines_its_scales_whole_and_shows_no_numbers() -> None:
+    items = NasaTlx(TlxSettings()).items()
+    assert [item.text.partition(":")[0] for item in items] == [
+        "Mental demand", "Physical demand", "Temporal demand", "Performance", "Effort",
+        "Frustration level",
+    ]  # fmt: skip
+    assert "(e.g. thinking, deciding, calculating, remembering, looking" in items[0].text
+    assert "(e.g. pushing, pulling, turning, controlling" in items[1].text
+    assert not any(item.numbered for item in items)
+
+
+def test_pairs_come_in_an_order_drawn_by_chance_that_is_recorded() -> None:
+    tlx = NasaTlx(TlxSettings(weighted=True))
+    plain = [item.name for item in tlx.items()]
+    orders = []
+    for seed in range(40):
+        form = QuestionnaireForm("tlx", tlx, {"step": 1}, seed=seed)
+        name, data = form.begin()
+        order = str(data["order"]).split()
+        assert name == "questionnaire.start"
+        assert order[:6] == plain[:6], "ratings stay"
+        assert sorted(order) == sorted(plain)
+        assert [item.name for item in in_order(tlx.items(), str(data["order"]))] == order
+        assert QuestionnaireForm("tlx", tlx, {"step": 1}, seed=seed).begin() == (name, data)
+        orders.append(order)
+    assert len({order[6] for order in orders}) > 8, "any of fifteen may be first"
+    assert "order" not in QuestionnaireForm("sus", BUILT["sus"], {"step": 1}).begin()[1]
+
+
+GERMAN = """\
+rights: our own translation
+title: Belastung
+items: ["A: a?", "B: b?", "C: c?", "D: d?", "E: e?", "F: f?"]
+left: gering
+right: hoch
+performance: [gut, schlecht]
+pair: "Was trug mehr bei: {one} oder {other}?"
+"""
+
+
+def test_the_load_index_and_sus_ask_in_the_language_of_the_labs_file(tmp_path: Path) -> None:
+    tlx = from_file(tmp_path, "nasa_tlx", GERMAN, weighted=True)
+    items = tlx.items()
+    assert (tlx.title, tlx.rights, len(items)) == ("Belastung", "our own translation", 21)
+    assert (items[3].text, items[3].left, items[3].right) == ("D: d?", "gut", "schlecht")
+    assert items[6].text == "Was trug mehr bei: A oder B?"
+    assert items[6].labels == ("A", "B")
+    assert tlx.score(RATINGS | dict.fromkeys((f"{a}_or_{b}" for a, b in PAIRS), "effort")) == {
+        "raw": pytest.approx(280 / 6), "weighted": pytest.approx(65.0),
+    }  # fmt: skip
+    statements = "items: [" + ", ".join(f"Satz {n}" for n in range(10)) + "]"
+    sus = from_file(tmp_path, "sus", f"rights: x\n{statements}\nleft: nein\nright: ja\n")
+    assert [item.text for item in sus.items()][9] == "Satz 9"
+    with pytest.raises(ProtocolError, match="the six scales are needed"):
+        from_file(tmp_path, "nasa_tlx", GERMAN.replace(', "F: f?"', ""))
+    with pytest.raises(ProtocolError, match=r"must have .one. and .other."):
+        from_file(tmp_path, "nasa_tlx", GERMAN.replace("{other}", "x"))
+    with pytest.raises(ProtocolError, match="SUS has 10 statements, and the lab's file has 1"):
+        from_file(tmp_path, "sus", "rights: x\nitems: [Satz]\n")
