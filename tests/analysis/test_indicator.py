@@ -25,6 +25,7 @@ from labcrane.analysis.scoring.operator_tests import (
 )
 from labcrane.analysis.scoring.settings import IndicatorSettings, Weights
 from labcrane.cli.app import main
+from labcrane.cli.commands.results import LEFT_OUT
 from labcrane.core.records import Event
 from labcrane.errors import LabcraneError, RecordingError
 from labcrane.participants.enrolment import exclude
@@ -156,21 +157,34 @@ def record(
     session: int = 1,
     ratings: bool = True,
     more: Sequence[tuple[str, float, dict]] = (),
+    views: Sequence[str] = (),
 ) -> None:
-    """Record trials as a scenario task would, ratings after each, as a session writes them."""
+    """Record trials as a scenario task would, ratings after each, as a session writes them.
+
+    ``views`` are of the operator, and show nothing.
+    """
     home = folder / operator
     home.mkdir(parents=True, exist_ok=True)
     path = home / f"ses-{session:02}_run.xdf"
     about = {
         "participant": operator, "study": "rescue", "indicator": LITERAL.model_dump(),
+        "rate_hz": 240.0,
         "simulated": operator.endswith("-SIMULATED"),
+        "components": {f"views.{name}": {"use": "view", "settings": {}} for name in views},
     }  # fmt: skip
-    columns = [Column("loop", "tick", "1"), Column("state", "joint.angle.boom", "rad")]
+    loop = [
+        Column("loop", name, unit) for name, unit in (("tick", "1"), ("due", "s"), ("paused", "1"))
+    ]
+    columns = [*loop, Column("state", "joint.angle.boom", "rad")]
     with SessionJournal(path, columns, 240.0) as journal:
         journal.write_event(Event("session.start", 1.0, about), 0)
-        journal.write_frame(1.0, np.zeros(2))
+        for name in views:
+            journal.write_event(Event("feedback.ready", 1.0, {"what": name, "facts": ""}), 0)
+        for tick, due in enumerate((1.0, 1.0 + 10.0 * len(rows))):
+            journal.write_frame(due, np.array([tick, due, 0.0, 0.0]))
         for at, row in enumerate(rows, start=1):
-            data = {**ROW, "trial": at, "ended": 10.0 * at, **row}
+            edges = {"started": 10.0 * at - 8.0, "ended": 10.0 * at, "paused": 0.0}
+            data = {**ROW, "trial": at, **edges, **row}
             rating = data.pop("ratings", (0.7, 0.6))
             journal.write_event(Event("trial.end", 10.0 * at, data), at)
             names = ("subjective_accuracy", "situational_awareness")
@@ -482,3 +496,29 @@ def test_a_session_without_a_tick_does_not_take_the_others_with_it(tmp_path: Pat
     consolidate(home / "P001.h5", [path])
     (person,) = find_cohort(tmp_path, ["half-finished"]).included
     assert [number for number, _ in person.sessions()] == [1]
+
+
+def test_a_test_of_which_the_operator_saw_nothing_is_left_out_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [trial(60.0, reference=True), trial(90.0), trial(80.0)]
+    record(tmp_path, "P001", rows)
+    record(tmp_path, "P002", rows, views=["cab"])
+    record(tmp_path, "P002", rows, session=2)  # its reference is of a session that was seen
+    said = []
+    tests = operator_tests(
+        find_cohort(tmp_path, ["half-finished"]),
+        leave_out=lambda name, why: said.append((name, why)),
+    )
+    assert [(test.operator, test.session, test.trial) for test in tests] == [
+        ("P001", 1, 2), ("P001", 1, 3), ("P002", 2, 2), ("P002", 2, 3),
+    ]  # fmt: skip
+    unseen = ", ".join(f"trial {number} of session 1" for number in (1, 2, 3))
+    assert said == [
+        ("P002", f"was shown too little in {unseen}, which count for nothing here (presented: in "
+         "the protocol)"),
+    ]  # fmt: skip
+    assert main(["score", str(tmp_path)]) == LEFT_OUT
+    assert f"left out: P002 was shown too little in {unseen}" in " ".join(
+        capsys.readouterr().out.split()
+    )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.presented import not_presented, presented
 from labcrane.analysis.scoring.indicator import Indicator, Performance, indicate
 from labcrane.analysis.scoring.settings import COUNTS, RATINGS, TIME, IndicatorSettings
 from labcrane.errors import LabcraneError, RecordingError
@@ -94,7 +95,8 @@ def operator_tests(
 ) -> list[OperatorTest]:
     """Return all tests of who is included, by operator, session and time.
 
-    Tests without a reference are left out, as are damaged recordings, and all others scored.
+    Left out are tests without a reference, tests and references of which the operator was shown too
+    little, and damaged recordings; all others are scored.
 
     Parameters
     ----------
@@ -136,17 +138,24 @@ def _tests(
 ) -> Iterator[OperatorTest]:
     reference: dict[str, list[float]] = {}
     lacking: dict[str, int] = {}
+    unseen: list[str] = []
     for number, session in zip(recording.sessions, recording, strict=True):
         trials = session.trials
         if not {TIME, *COUNTS.values()} <= set(trials.columns):
             continue
-        rows = trials.to_dict("records")
+        shown = presented(session)
+        failed = not_presented(trials if shown is None else shown)
+        unseen += [
+            f"trial {row['trial']:g} of session {number}"
+            for row in filter(_counts, trials[failed].to_dict("records"))
+        ]
+        rows = trials[~failed].to_dict("records")
         here: dict[str, list[float]] = {}
         for row in filter(_is_reference, rows):
             here.setdefault(_scene(row), []).append(float(row[TIME]))
         reference |= here  # the latest stage that there is, scenario by scenario
         for row in rows:
-            if row["practice"] == 1 or row.get("reference") == 1 or row["outcome"] == "repeated":
+            if not _counts(row) or row.get("reference") == 1:
                 continue
             times = reference.get(_scene(row), [])
             if not times:
@@ -155,8 +164,19 @@ def _tests(
             used = settings or _settings(session)
             mean = sum(times) / len(times)
             yield _test(recording.participant, number, session, row, mean, used)
+    if unseen:
+        leave_out(
+            recording.participant,
+            f"was shown too little in {', '.join(unseen)}, which count for nothing here "
+            "(presented: in the protocol)",
+        )
     if lacking:
         leave_out(recording.participant, _without_reference(lacking, reference, recording))
+
+
+def _counts(row: Mapping[Any, Any]) -> bool:
+    """Say whether a trial is a test or of the reference, and the attempt that holds."""
+    return bool(row["practice"] != 1 and row["outcome"] != "repeated")
 
 
 def _scene(row: Mapping[Any, Any]) -> str:
