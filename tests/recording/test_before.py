@@ -154,6 +154,9 @@ def test_the_same_seed_writes_the_same_events(before: Path, now: Path) -> None:
     assert start["components"]["tasks.aiming"]["settings"].pop("onset_share") == 0.05
     operator = again["components"]["input"]["settings"]
     assert {name: operator.pop(name) for name in ADDED_SETTINGS} == ADDED_SETTINGS
+    for part, choice in again["components"].items():
+        if part.startswith("questionnaires.") and "text" in choice["settings"]:
+            assert {choice["settings"].pop(name) for name in ("file", "text")} == {None}
     assert {name: again[name] for name in kept} == {name: start[name] for name in kept}
     assert len(new) == len(old)
     stamps = [journal(folder)["labcrane.events"]["time_stamps"][1:] for folder in (before, now)]
