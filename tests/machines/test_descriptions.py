@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -466,3 +467,49 @@ def test_an_equality_that_moves_no_joint_on_the_way_changes_nothing(tmp_path: Pa
         '<joint joint1="level" joint2="lift" active="false"/>',
     ):
         assert hinged(tmp_path, equality).joints == plain.joints
+
+
+def test_the_rounding_of_a_file_is_taken_and_said(tmp_path: Path) -> None:
+    """Pitch joints turned by pi/2 of four decimals, and a tip 0.4 mm aside."""
+    text = (EXAMPLES / "openmanipulator_x.urdf").read_text()
+    exact = described(OMX)
+    turned = text.replace(
+        '0.024 0 0.128"/><axis xyz="0 1 0"/>', '0.024 0 0.128"/><axis xyz="0 1 0.0000037"/>'
+    ).replace('<origin xyz="0.126 0 0"/>', '<origin xyz="0.126 0.0004 0"/>')
+    (tmp_path / "openmanipulator_x.urdf").write_text(turned)
+    machine = described(OMX, tmp_path)
+    assert exact.source == "openmanipulator_x.urdf"
+    assert "up to 0.0002 degrees, and whose tip and slew axis up to 0.40 mm, off" in machine.source
+    for angles in poses(exact, 50):
+        assert Arm(machine).tip(angles) == pytest.approx(Arm(exact).tip(angles), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('0.024 0 0.128"/><axis xyz="0 1 0"/>', '0.024 0 0.128"/><axis xyz="0 1 0.01"/>',
+         "joint 'joint3' must pitch about a level axis"),
+        ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>', "'joint1' has the axis 0 0 0"),
+        ("<link name", '<xacro:arm xmlns:xacro="http://wiki.ros.org/xacro"/><link name',
+         "it is xacro, not yet URDF"),
+    ],
+)  # fmt: skip
+def test_what_is_no_rounding_is_refused(old: str, new: str, said: str, tmp_path: Path) -> None:
+    text = (EXAMPLES / "openmanipulator_x.urdf").read_text()
+    assert old in text
+    (tmp_path / "openmanipulator_x.urdf").write_text(text.replace(old, new, 1))
+    with pytest.raises(ProtocolError, match=said):
+        described(OMX, tmp_path)
+
+
+def test_a_limit_that_is_not_written_is_zero(tmp_path: Path) -> None:
+    text = (EXAMPLES / "openmanipulator_x.urdf").read_text()
+    lower = re.search(r'lower="[^"]*" ', text)[0]
+    (tmp_path / "openmanipulator_x.urdf").write_text(text.replace(lower, "", 1))
+    machine = described(OMX, tmp_path)
+    assert machine.limits[0][0] == 0.0
+    upper = re.search(r'upper="[^"]*" ', text)[0]
+    without = text.replace(lower, "", 1).replace(upper, "", 1)
+    (tmp_path / "openmanipulator_x.urdf").write_text(without)
+    with pytest.raises(ProtocolError, match="'joint1' goes from 0 to 0 rad by its"):
+        described(OMX, tmp_path)

@@ -17,8 +17,11 @@ import numpy as np
 from labcrane.machines.machine import UPWARD_TO_LEVEL
 from labcrane.types import FloatArray
 
+ROUNDED = 1e-3
+"""How far off its place a file may have an axis, in rad and in m: pi/2 is often 1.5708."""
+
 NEARLY = 1e-6
-"""How far, in m and as a sine, axes may be from where they must be: rounding of a file."""
+"""How far, in m and as a sine, what is in its place may be from it: rounding of arithmetic."""
 
 ROUNDING = 1e-12
 
@@ -149,7 +152,7 @@ def machine_fields(
 
     ends = [flat(each.point) for each in chain] + [flat(tip)]
     radius, height = ends[0]
-    if radius < -NEARLY:
+    if radius < -ROUNDED:
         raise ChainError(
             f"the axis of {chain[0].name!r} is {-radius:.3f} m behind that of {slew.name!r}, and "
             "must be over or before it"
@@ -184,20 +187,21 @@ def _plane(slew: Axis, chain: Sequence[Axis], tip: FloatArray) -> tuple[FloatArr
     ChainError
         The joints do not move in one upright plane that turns with the first one.
     """
-    if abs(abs(slew.direction[2]) - 1.0) > NEARLY:
+    if math.hypot(*slew.direction[:2]) > ROUNDED:
         raise ChainError(f"joint {slew.name!r} comes first and must slew about an upright axis")
-    if abs(slew.point[1]) > NEARLY:
+    if abs(slew.point[1]) > ROUNDED:
         raise ChainError(
             f"the axis of {slew.name!r} is {slew.point[1]:.3f} m beside the base's x axis; move "
             "the base under it"
         )
-    across = chain[0].direction
+    across = chain[0].direction * [1.0, 1.0, 0.0]
+    across /= np.linalg.norm(across) or 1.0
     for each in chain:
-        if abs(each.direction[2]) > NEARLY:
+        if abs(each.direction[2]) > ROUNDED:
             raise ChainError(
                 f"joint {each.name!r} must pitch about a level axis, as all but the first"
             )
-        if abs(abs(each.direction @ across) - 1.0) > NEARLY:
+        if np.linalg.norm(np.cross(each.direction, across)) > 2.0 * ROUNDED:
             raise ChainError(
                 f"the axes of {chain[0].name!r} and {each.name!r} are not parallel, as those of "
                 "pitch joints must be"
@@ -207,12 +211,27 @@ def _plane(slew: Axis, chain: Sequence[Axis], tip: FloatArray) -> tuple[FloatArr
     if reach[0] < -NEARLY or (abs(reach[0]) <= NEARLY and reach[1] < -NEARLY):
         across, ahead = -across, -ahead
     beside = float(across @ (tip - slew.point))
-    if abs(beside) > NEARLY:
+    if abs(beside) > ROUNDED:
         raise ChainError(
             f"the tip is {abs(beside):.3f} m beside the plane of the slew axis and must be in it; "
             "name another link as the tip"
         )
     return across, ahead
+
+
+def rounding(axes: Sequence[Axis], tip: FloatArray) -> str:
+    """Say how far off one upright plane the axes of a file are; nothing where they are in it."""
+    slew, *chain = axes
+    across, _ = _plane(slew, chain, tip)
+    turned = [math.hypot(*slew.direction[:2])]
+    turned += [float(np.linalg.norm(np.cross(each.direction, across))) for each in chain]
+    beside = [abs(float(slew.point[1])), abs(float(across @ (tip - slew.point)))]
+    if max(*turned, *beside) <= NEARLY:
+        return ""
+    return (
+        f", whose axes are up to {math.degrees(max(turned)):.4f} degrees, and whose tip and slew "
+        f"axis up to {1000.0 * max(beside):.2f} mm, off one upright plane, and are put into it"
+    )
 
 
 def _joint(

@@ -92,7 +92,11 @@ class MachineDescription(StrictModel):
             The file is not there, or is of another kind of machine.
         """
         # A study with a machine of labcrane's own is checked without NumPy.
-        from labcrane.machines.descriptions.chain import ChainError, machine_fields  # noqa: PLC0415
+        from labcrane.machines.descriptions.chain import (  # noqa: PLC0415
+            ChainError,
+            machine_fields,
+            rounding,
+        )
 
         path = folder / self.file
         if not is_file(path):
@@ -106,10 +110,12 @@ class MachineDescription(StrictModel):
             found = self._file(path, folder)
             speeds = {name: math.radians(each) for name, each in self.speeds_deg_s.items()}
             axes = found.axes(self.names, self.tip, speeds, self.efforts)
-            fields = machine_fields(axes, found.tip(self.tip), self.rest_deg, self.thickness)
+            tip = found.tip(self.tip)
+            fields = machine_fields(axes, tip, self.rest_deg, self.thickness)
+            source = f"{path.name}{rounding(axes, tip)}"
         except ChainError as error:
             raise ProtocolError(f"{path}: {error}", at=self.place(error.name)) from error
-        fields = {"title": self.title or found.title, "source": f"{path.name}", **fields}
+        fields = {"title": self.title or found.title, "source": source, **fields}
         try:
             machine = Machine.model_validate(fields, context={"folder": folder})
             return machine, json.dumps(fields, indent=1) + "\n"

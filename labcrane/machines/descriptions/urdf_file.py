@@ -54,6 +54,8 @@ class UrdfFile:
         root = check_robot(path, folder)
         if root.tag != "robot":
             raise ChainError(f"it is no URDF: its root is <{root.tag}>, and must be <robot>")
+        if any("xacro" in str(each.tag) for each in root.iter()):
+            raise ChainError("it is xacro, not yet URDF; expand it first: xacro FILE > arm.urdf")
         self.title = root.get("name", path.stem)
         self._links = {_name(each): each for each in root.findall("link")}
         self._joints = {_name(each): each for each in root.findall("joint")}
@@ -148,10 +150,17 @@ class UrdfFile:
         limits = (
             WHOLE_TURN
             if kind == "continuous"
-            else (_number(given, "lower", name), _number(given, "upper", name))
+            else (_number(given, "lower", name, 0.0), _number(given, "upper", name, 0.0))
         )
         pose = self._poses[_link(joint, "child")]
+        if limits[0] >= limits[1]:
+            raise ChainError(
+                f"joint {name!r} goes from {limits[0]:g} to {limits[1]:g} rad by its limit; lower "
+                "and upper are 0 where they are not written"
+            )
         direction = pose[:3, :3] @ _vector(joint.find("axis"), "xyz", (1.0, 0.0, 0.0))
+        if not np.any(direction):
+            raise ChainError(f"joint {name!r} has the axis 0 0 0, which is no direction")
         carries = together([self._mass(each) for each in links])
         if carries.mass <= 0.0:
             raise ChainError(f"nothing that moves with joint {name!r} has a mass")
