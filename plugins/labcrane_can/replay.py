@@ -1,6 +1,8 @@
 """A recorded bus as an input device."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from labcrane import FloatArray, Frame, InputDevice, Machine, ProtocolError, Run, Tick
 from labcrane.core import Value
@@ -10,6 +12,22 @@ from labcrane_can.settings import ReplaySettings
 
 MICROSECONDS = 6
 """Digits of a time that all formats keep; what follows differs between them."""
+
+
+BACK_S = 0.01
+"""How far a frame may be stamped before the one that was logged before it: drivers reorder."""
+
+
+def times_of(stamps: Sequence[float], *, relative: bool) -> list[float]:
+    """Return the time of each frame from the first one on, in seconds.
+
+    Parameters
+    ----------
+    relative
+        Whether each is counted from the frame before it, as an asc log may say.
+    """
+    times = np.cumsum(stamps) if relative else np.asarray(stamps)
+    return [round(float(time - times[0]), MICROSECONDS) for time in times]
 
 
 class CanReplay(InputDevice):
@@ -28,13 +46,21 @@ class CanReplay(InputDevice):
         try:
             with can.LogReader(settings.file) as log:
                 self._frames = list(log)
+                relative = getattr(log, "timestamps_format", "") == "relative"
         except (OSError, ValueError, can.CanError) as error:
             raise ProtocolError(
                 f"{settings.file} cannot be read as a candump, asc or blf log: {error}"
             ) from error
         if not self._frames:
             raise ProtocolError(f"{settings.file} holds no frames, so there is nothing to replay")
-        self._start = self._frames[0].timestamp
+        self._times = times_of([frame.timestamp for frame in self._frames], relative=relative)
+        back = np.diff(self._times)
+        if len(back) and back.min() < -BACK_S:
+            at = int(back.argmin()) + 1
+            raise ProtocolError(
+                f"the clock of {settings.file} goes back by {-back[at - 1]:g} s at its frame "
+                f"{at + 1}, so that nobody knows when what follows was sent; cut the log there"
+            )
 
     def open(self, run: Run) -> None:
         self._rate_hz = run.rate_hz
@@ -45,7 +71,7 @@ class CanReplay(InputDevice):
         now = tick.number / self._rate_hz
         while self._next < len(self._frames):
             frame = self._frames[self._next]
-            at = round(frame.timestamp - self._start, MICROSECONDS)
+            at = self._times[self._next]
             if at > now:
                 break
             self._commands.take(frame, at)

@@ -258,6 +258,36 @@ def test_a_candump_log_of_a_live_bus_replays_what_the_panel_was_heard_to_say(
         assert device.read(Tick(number, 0.0, 0.0), make_frame(run))[:4].tolist() == expected
 
 
+def test_an_asc_log_whose_times_count_from_frame_to_frame_is_played_at_its_pace(
+    tmp_path: Path,
+) -> None:
+    """Vector's loggers write either; python-can's reader adds nothing up."""
+    absolute = a_log(tmp_path / "panel.asc")
+    text, was = absolute.read_text(), 0.0
+    lines = text.replace("timestamps absolute", "timestamps relative").split("\n")
+    for at, line in enumerate(lines):
+        if found := re.match(r" *(\d+\.\d+)( .*)", line):
+            now = float(found[1])
+            lines[at], was = f"{now - was:11.6f}{found[2]}", now
+    relative = tmp_path / "relative.asc"
+    relative.write_text("\n".join(lines))
+    assert "timestamps relative" in relative.read_text()
+    found = [
+        commands_of(CanReplay(ReplaySettings(file=path, valves=VALVES), ch8()), 1200)
+        for path in (absolute, relative)
+    ]
+    assert found[0] == found[1]
+
+
+def test_a_log_whose_clock_was_set_back_is_refused_with_the_frame(tmp_path: Path) -> None:
+    path = a_log(tmp_path / "panel.log")
+    first, *rest = path.read_text().splitlines()
+    path.write_text("\n".join([first, *rest, first]) + "\n")
+    said = rf"the clock of .*panel.log goes back by .* s at its frame {len(rest) + 2}"
+    with pytest.raises(ProtocolError, match=said):
+        CanReplay(ReplaySettings(file=path, valves=VALVES), ch8())
+
+
 def test_what_is_no_log_is_refused_in_words(tmp_path: Path) -> None:
     (tmp_path / "empty.log").write_text("", encoding="utf-8")
     with pytest.raises(ProtocolError, match=r"empty.log holds no frames, so there is nothing"):
