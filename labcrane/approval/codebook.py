@@ -9,6 +9,7 @@ from labcrane.core.records import Value
 from labcrane.core.signals import Layout
 from labcrane.design.plan import plan_session
 from labcrane.files.pseudonyms import pseudonyms
+from labcrane.protocol.design import CONDITION
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.frame_log import LOOP
@@ -16,8 +17,8 @@ from labcrane.recording.trial_columns import OWN, UNITS, trial_units
 
 CORE = "labcrane"
 ABOUT = (
-    "trial", "attempt", "block", "block_name", "practice", "reference", "group", "feedback",
-    "outcome", "completion", "track_success",
+    "trial", "attempt", "block", "block_name", "practice", "reference", "group", CONDITION,
+    "feedback", "outcome", "completion", "track_success",
 )  # fmt: skip
 """Columns of the trial table that are labcrane's own, besides those with units."""
 
@@ -80,6 +81,8 @@ def _trials(study: Study) -> list[CodebookColumn]:
         unit = units.get(name, "")
         found[name] = CodebookColumn("trials", name, unit, CORE, defined.get(name, ""))
     for name, (task, values) in _conditions(study).items():
+        if name in found:
+            continue  # labcrane's own, as the condition within participants
         choice = study.task_choices[task]
         unit = trial_units(study.tasks[task]).get(name, "" if _is_text(values) else "1")
         found[name] = CodebookColumn("trials", name, unit, f"{choice.plugin}: {choice.name}")
@@ -97,6 +100,7 @@ def _has(study: Study, name: str) -> bool:
     steps = [step for session in protocol.sessions for step in session.steps]
     given = {
         "group": bool(protocol.design.groups),
+        CONDITION: any(step.block is not None and step.block.condition for step in steps),
         "feedback": bool(protocol.feedback),
         "track_success": any(step.block is not None and step.block.track for step in steps),
         "reference": any(step.kind == "reference" for step in steps),

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from labcrane.approval.lock import Lock
+from labcrane.design.order import SQUARES
 
 
 def methods(lock: Lock) -> str:
@@ -73,15 +74,32 @@ ORDERS = {
 
 def _design(protocol: Mapping[str, Any]) -> list[str]:
     said = []
-    for factor, order in protocol.get("design", {}).get("order", {}).items():
+    design = protocol.get("design", {})
+    conditions, orders = design.get("conditions", {}), design.get("order", {})
+    if conditions:
+        listed = ", ".join(f"{name}, {_given(given)}" for name, given in conditions.items())
+        said.append(f"Every participant had {len(conditions)} conditions ({listed})")
+        orders = {"condition": "as_written", **orders}
+    for factor, order in orders.items():
         rule: Mapping[str, Any] = {"rule": order} if isinstance(order, str) else order
         words = f"The levels of {factor} came {ORDERS[rule['rule']]}"
+        if factor == "condition" and conditions and rule["rule"] in SQUARES:
+            words += ", which participant had which being drawn at random"
         if rule.get("times", 1) > 1:
             words += f", {rule['times']} times each"
         if rule.get("in_a_row"):
             words += f", no more than {rule['in_a_row']} in a row"
         said.append(words)
     return said
+
+
+def _given(feedback: str | list[str]) -> str:
+    """Return what a condition is given: ``with the feedback ball and tone``."""
+    if feedback in ("none", []):
+        return "without feedback"
+    if feedback in ("all", "group"):
+        return "with all feedback" if feedback == "all" else "with the feedback of the group"
+    return f"with the feedback {_value(feedback)}"
 
 
 def _sessions(protocol: Mapping[str, Any]) -> list[str]:
@@ -102,6 +120,8 @@ def _step(step: str | Mapping[str, Any]) -> str:
         return f"{kind} ({value})"
     name = value.get("name") or value.get("task")
     times = value.get("repeat", 1)
+    if place := value.get("condition"):
+        name = f"{name} (the participant's condition {place})"
     label = f"{kind} {name}" if name else f"{kind} ({_listed(value)})"
     return f"{times} times {label}" if times > 1 else label
 

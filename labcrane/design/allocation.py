@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from labcrane.design.order import SQUARES
 from labcrane.design.plan import plan_session
 from labcrane.design.squares import carry_over, positions, spread
+from labcrane.protocol.design import CONDITION
 from labcrane.protocol.study import Study
 
 
@@ -22,6 +23,8 @@ class Allotment:
         The participant's own.
     levels
         The order of each factor's levels.
+    condition
+        Which of the participant's conditions it is of, by name; "" for none.
     """
 
     participant: str
@@ -32,13 +35,14 @@ class Allotment:
     block: int
     name: str
     levels: Mapping[str, tuple[str, ...]]
+    condition: str = ""
 
 
 def allocate(study: Study, participants: Mapping[str, int | None]) -> list[Allotment]:
     """Return the blocks of all participants, given with their slots."""
     return [
         Allotment(name, plan.slot, plan.group, plan.seed, number, block.number, block.name,
-                  block.levels)
+                  block.levels, block.condition)
         for name, slot in participants.items()
         for number in range(1, len(study.protocol.sessions) + 1)
         for plan in [plan_session(study, name, number, slot)]
@@ -55,7 +59,12 @@ def balance(study: Study, allotments: Sequence[Allotment]) -> list[str]:
     for factor, order in study.protocol.design.order.items():
         if order.rule in SQUARES:
             for group in dict.fromkeys(each.group for each in allotments):
-                lines += _square(factor, order.rule, _orders(allotments, factor, group), group)
+                orders = (
+                    conditions_in(allotments, group)
+                    if factor == CONDITION
+                    else _orders(allotments, factor, group)
+                )
+                lines += _square(factor, order.rule, orders, group)
     return lines
 
 
@@ -82,6 +91,15 @@ def _orders(allotments: Sequence[Allotment], factor: str, group: str) -> dict[st
         if each.group == group and len(levels) > len(found.get(each.participant, ())):
             found[each.participant] = levels
     return found
+
+
+def conditions_in(allotments: Sequence[Allotment], group: str) -> dict[str, tuple[str, ...]]:
+    """Return in which order each participant of a group has conditions for the first time."""
+    found: dict[str, dict[str, None]] = {}
+    for each in allotments:
+        if each.group == group and each.condition:
+            found.setdefault(each.participant, {})[each.condition] = None
+    return {name: tuple(own) for name, own in found.items()}
 
 
 def _square(factor: str, rule: str, orders: Mapping[str, tuple[str, ...]], group: str) -> list[str]:
@@ -119,6 +137,7 @@ def as_csv(allotments: Sequence[Allotment]) -> str:
     )
     for each in allotments:
         about = [each.participant, each.slot, each.group, each.seed, each.session, each.block]
-        for factor, levels in each.levels.items():
+        said = {CONDITION: (each.condition,)} if each.condition else {}
+        for factor, levels in {**said, **each.levels}.items():
             writer.writerow([*about, each.name, factor, " ".join(levels)])
     return out.getvalue()

@@ -2,7 +2,9 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from labcrane.core.records import PlannedTrial, Trial, Value
 from labcrane.core.roles import Task
@@ -10,7 +12,7 @@ from labcrane.design.order import RULES, SQUARES, Turn, faded
 from labcrane.design.seeds import derive
 from labcrane.design.slots import group_of, place_of
 from labcrane.design.tracks import PlannedTrack, plan_rounds, standing
-from labcrane.protocol.design import AS_WRITTEN, Criterion
+from labcrane.protocol.design import AS_WRITTEN, CONDITION, Criterion, Switch
 from labcrane.protocol.steps import READING_S, Block, Step
 from labcrane.protocol.study import Study
 
@@ -68,6 +70,8 @@ class PlannedBlock:
         What chooses the levels of a factor while it runs.
     unjudged
         The number of its test that the supervisor was still to judge before it stopped; 0 for none.
+    condition
+        Which of the participant's conditions it is of, by name; "" for none.
     """
 
     name: str
@@ -86,6 +90,7 @@ class PlannedBlock:
     streak: int = 0
     track: PlannedTrack | None = None
     unjudged: int = 0
+    condition: str = ""
 
     @property
     def expected_s(self) -> float:
@@ -187,6 +192,7 @@ class Planner:
         self.group = group_of(study.protocol.study, groups, slot)
         self._place = place_of(groups, slot)
         self._words = (study.protocol.study, participant, session)
+        self._conditions = conditions_of(study, participant, self.group, self._place)
         self._steps = 0
         self._blocks = 0
         self._trials = 0
@@ -227,8 +233,14 @@ class Planner:
             turn = Turn(seed, self._place + self._shift(factor))
             ordered = RULES[order.rule](written, turn, order.times, order.in_a_row)
             levels[factor] = ordered[: block.limits.get(factor)]
-        track = self._track(block, task, levels) if adaptive is not None else None
-        planned = task.plan(levels) if track is None else self._rounds(track)
+        condition, switch = "", block.feedback
+        if block.condition is not None:
+            condition = self._conditions[block.condition - 1]
+            switch = self._study.protocol.design.conditions[condition]
+        track = self._track(block, task, levels, condition) if adaptive is not None else None
+        planned = (
+            _of_condition(condition, task.plan(levels)) if track is None else self._rounds(track)
+        )
         trials = tuple(map(self._trial, planned))
         name = block.name or block.task
         return PlannedBlock(
@@ -243,18 +255,19 @@ class Planner:
             last=last,
             reference=kind == "reference",
             ask=block.ask,
-            feedback=self._feedback(block, trials),
+            feedback=self._feedback(switch, block.fading, trials),
             track=track,
+            condition=condition,
         )
 
     def _track(
-        self, block: Block, task: Task, levels: Mapping[str, tuple[str, ...]]
+        self, block: Block, task: Task, levels: Mapping[str, tuple[str, ...]], condition: str
     ) -> PlannedTrack:
         track = self._study.protocol.design.tracks[block.track]
-        rounds = {
-            level: plan_rounds(block.track, level, task.plan({**levels, track.factor: (level,)}))
-            for level in track.levels
-        }
+        rounds = {}
+        for level in track.levels:
+            trials = task.plan({**levels, track.factor: (level,)})
+            rounds[level] = plan_rounds(block.track, level, _of_condition(condition, trials))
         size = len(next(iter(rounds.values())))
         return PlannedTrack(block.track, track, self._trials + 1, size * track.rounds, rounds)
 
@@ -271,7 +284,9 @@ class Planner:
         Whenever all rows of the first square have been used, the others begin a row later.
         """
         orders = self._study.protocol.design.order
-        squares = [name for name, order in orders.items() if order.rule in SQUARES]
+        squares = [
+            name for name, order in orders.items() if order.rule in SQUARES and name != CONDITION
+        ]
         if factor not in squares[1:]:
             return 0
         factors = {
@@ -282,9 +297,11 @@ class Planner:
         rows = len(SQUARES[orders[squares[0]].rule](len(factors[squares[0]])))
         return squares.index(factor) * (self._place // rows)
 
-    def _feedback(self, block: Block, trials: Sequence[Trial]) -> dict[int, tuple[str, ...]]:
+    def _feedback(
+        self, chosen: Switch, fading: Sequence[float], trials: Sequence[Trial]
+    ) -> dict[int, tuple[str, ...]]:
         """Return what is on in each trial; an uncounted one is like the counted one after it."""
-        protocol, chosen = self._study.protocol, block.feedback
+        protocol = self._study.protocol
         if not protocol.feedback:
             return {}
         if chosen == "group":
@@ -293,7 +310,7 @@ class Planner:
             names = tuple(protocol.feedback)
         else:
             names = () if chosen == "none" else chosen
-        on = iter(faded(sum(trial.planned.counted for trial in trials), block.fading))
+        on = iter(faded(sum(trial.planned.counted for trial in trials), fading))
         shown: dict[int, tuple[str, ...]] = {}
         waiting: list[int] = []
         for trial in trials:
@@ -307,6 +324,32 @@ class Planner:
     def _trial(self, planned: PlannedTrial) -> Trial:
         self._trials += 1
         return Trial(self._trials, 1, derive(*self._words, "trial", self._trials, 1), planned)
+
+
+def _of_condition(condition: str, trials: Sequence[PlannedTrial]) -> Sequence[PlannedTrial]:
+    """Return trials that say of which condition within participants they are; of none, as is."""
+    if not condition:
+        return trials
+    return [replace(each, condition={**each.condition, CONDITION: condition}) for each in trials]
+
+
+def conditions_of(study: Study, participant: str, group: str, place: int) -> tuple[str, ...]:
+    """Return a participant's conditions in the order in which they come, alike in all sessions.
+
+    Of each group as many participants as a square has rows get every row once, in an order that is
+    drawn: whoever knows the last one's does not know the next one's.
+    """
+    design, name = study.protocol.design, study.protocol.study
+    order, levels = design.order.get(CONDITION, AS_WRITTEN), tuple(design.conditions)
+    if not levels:
+        return ()
+    if order.rule in SQUARES:
+        rows = len(SQUARES[order.rule](len(levels)))
+        run, at = divmod(place, rows)
+        drawn = np.random.default_rng(derive(name, CONDITION, group, run)).permutation(rows)
+        place = int(drawn[at])
+    turn = Turn(derive(name, participant, CONDITION), place)
+    return RULES[order.rule](levels, turn, order.times, order.in_a_row)
 
 
 def slot_by_name(participant: str) -> int:

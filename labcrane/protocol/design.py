@@ -1,7 +1,7 @@
 """Design section of a protocol."""
 
 from math import comb
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, PositiveInt, ValidationInfo, field_validator
 
@@ -72,6 +72,14 @@ RuleName = Annotated[str, Field(json_schema_extra={"enum": list(RULES)})]
 
 AS_WRITTEN = LevelOrder(rule="as_written")
 
+CONDITION = "condition"
+"""Column of the trial table: which condition within participants a block is of; also what their
+order is called under ``design: order:``."""
+
+Switch = Literal["all", "none", "group"] | tuple[str, ...]
+"""Which feedback is switched on: ``all``, ``none``, what the participant's ``group`` is given, or
+a list of names."""
+
 
 class Design(Settings):
     """What is varied, and how."""
@@ -80,10 +88,15 @@ class Design(Settings):
     """Between-subject groups, and the feedback that each is given: ``{none: [], visual:
     [sphere]}``. Participants are spread over them equally."""
 
+    conditions: dict[str, Switch] = Field(default_factory=dict)
+    """Conditions within participants, and the feedback that is on in each: ``{plain: none, tone:
+    [tone]}``. Everybody has all of them. A block with ``condition: 1`` is of the participant's
+    first, in the order of ``order: {condition: latin_square}``."""
+
     order: dict[str, LevelOrder] = Field(default_factory=dict)
     """For each factor of the tasks, in which order its levels come: ``{pairs: shuffled}``, or
     ``{pairs: {rule: shuffled, times: 3, in_a_row: 2}}``. Factors that are not named come as
-    written."""
+    written. ``condition`` is the order of the conditions."""
 
     tracks: dict[str, Track] = Field(default_factory=dict)
     """Levels that are chosen while the session runs, by what the participant does: staircases and
@@ -93,6 +106,23 @@ class Design(Settings):
     """The primary outcomes, by which the study is judged: results of its tasks or measures of a
     movement, ``[circle_to_circle, absolute_error]``. Their trends share one correction for several
     tests; where none are named, all outcomes that the report tests share it."""
+
+    @field_validator("conditions")
+    @classmethod
+    def _several(cls, conditions: dict[str, Switch]) -> dict[str, Switch]:
+        if len(conditions) == 1:
+            raise ValueError(
+                f"{next(iter(conditions))!r} is the only condition; write two or more, or feedback "
+                "at the block"
+            )
+        if "" in conditions:
+            raise ValueError("a condition has no name; give it one")
+        return conditions
+
+    @property
+    def positions(self) -> int:
+        """How many conditions a participant has, one after another; 0 without any."""
+        return len(self.conditions) * self.order.get(CONDITION, AS_WRITTEN).times
 
     @field_validator("primary")
     @classmethod

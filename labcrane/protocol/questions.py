@@ -18,7 +18,7 @@ from labcrane.files.pseudonyms import pseudonyms
 from labcrane.files.system import is_there
 from labcrane.files.yaml import Place
 from labcrane.protocol.components import ComponentSpec
-from labcrane.protocol.design import AS_WRITTEN
+from labcrane.protocol.design import AS_WRITTEN, CONDITION
 from labcrane.protocol.effective import written_numbers
 from labcrane.protocol.pages import unserved
 from labcrane.protocol.references import twice
@@ -179,6 +179,7 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_what_groups_are_not_given(study)
     yield from _of_groups(study)
     yield from _of_squares(study)
+    yield from _of_conditions(study)
     yield from _of_sessions(study)
     yield from _of_what_counts(study)
     yield from _of_what_is_scored(study)
@@ -228,8 +229,12 @@ def _of_pattern(study: Study) -> Doubts:
 
 def _of_repeats(study: Study) -> Doubts:
     """Question what is listed twice, and groups that are given the same."""
+    design = study.protocol.design
     lists: dict[Place, Sequence[str]] = {
-        ("design", "groups", name): given for name, given in study.protocol.design.groups.items()
+        ("design", key, name): given
+        for key, some in (("groups", design.groups), ("conditions", design.conditions))
+        for name, given in some.items()
+        if isinstance(given, tuple)
     }
     for place, block in _blocks(study):
         kind = study.protocol.sessions[int(place[1])].steps[int(place[3])].kind
@@ -345,7 +350,9 @@ def _blocks(study: Study) -> Iterator[tuple[Place, Block]]:
 
 def _of_feedback(study: Study) -> Doubts:
     protocol = study.protocol
-    ways = [block.feedback for _, block in _blocks(study)]
+    ways = [block.feedback for _, block in _blocks(study) if block.condition is None]
+    if any(block.condition is not None for _, block in _blocks(study)):
+        ways += protocol.design.conditions.values()
     used = {name for way in ways if isinstance(way, tuple) for name in way}
     if "group" in ways:
         used |= {name for names in protocol.design.groups.values() for name in names}
@@ -509,7 +516,9 @@ def _of_silent_blocks(study: Study) -> Doubts:
     all_of_it = ", ".join(study.protocol.feedback)
     for number, session in enumerate(study.protocol.sessions):
         for at, step in enumerate(session.steps):
-            if step.block is not None and "feedback" not in step.block.model_fields_set:
+            if step.block is None or step.block.condition is not None:
+                continue
+            if "feedback" not in step.block.model_fields_set:
                 yield (
                     ("sessions", number, "steps", at),
                     f"sessions: step {at + 1} of {session.name!r} does not say which feedback it "
@@ -569,6 +578,7 @@ def _of_squares(study: Study) -> Doubts:
         return
     groups = max(1, len(protocol.design.groups))
     factors = {name: seen for task in study.tasks.values() for name, seen in task.factors().items()}
+    factors[CONDITION] = tuple(protocol.design.conditions)
     for factor, order in protocol.design.order.items():
         n = len(factors.get(factor, ()))
         if order.rule not in {"latin_square", "williams"} or n < 2:  # noqa: PLR2004 - no order
@@ -580,6 +590,48 @@ def _of_squares(study: Study) -> Doubts:
                 f"{protocol.participants.planned} planned do not balance the {order.rule} of "
                 f"{factor}, which has {rows} rows; a multiple of {rows * groups} does",
             )
+
+
+def _of_conditions(study: Study) -> Doubts:
+    """Question conditions that not everybody has alike, or whose order tells what they do."""
+    design = study.protocol.design
+    if not design.conditions:
+        return
+    at: Place = ("design", "conditions")
+    done: dict[int, list[Block]] = {place: [] for place in range(1, design.positions + 1)}
+    for _, kind, block in _steps(study):
+        if kind == "block" and block.condition is not None:
+            done[block.condition].append(block)
+    if lacking := [f"{place}" for place, blocks in done.items() if not blocks]:
+        yield (
+            at,
+            f"no block has condition: {', '.join(lacking)}, of {design.positions}, so that each "
+            f"participant lacks {'a condition' if len(lacking) == 1 else 'conditions'} of those "
+            "that others have",
+        )
+    same = [
+        sorted((each.task, each.repeat, sorted(each.limits.items())) for each in blocks)
+        for blocks in done.values()
+        if blocks
+    ]
+    if any(each != same[0] for each in same):
+        yield (
+            at,
+            "the blocks of the conditions differ in task, repeat or levels, so that a condition is "
+            "tested with other trials in one position than in another",
+        )
+    meant = {"all": tuple(study.protocol.feedback), "none": (), "group": ("the group's",)}
+    given: dict[frozenset[str], str] = {}
+    for name, switch in design.conditions.items():
+        feedback = switch if isinstance(switch, tuple) else meant[switch]
+        if (other := given.setdefault(frozenset(feedback), name)) != name:
+            yield (*at, name), f"conditions {other!r} and {name!r} are given the same feedback"
+    if CONDITION not in design.order:
+        yield (
+            ("design", "order", CONDITION),
+            "design has no order for condition, so that conditions come in one order for everybody "
+            "and what they do cannot be told from learning; write order: {condition: latin_square}",
+        )
 
 
 def _of_sessions(study: Study) -> Doubts:

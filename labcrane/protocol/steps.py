@@ -22,7 +22,7 @@ from labcrane.files.names import absent, outside
 from labcrane.files.system import is_folder
 from labcrane.files.units import Unit
 from labcrane.files.yaml import Place, YamlFile, read_text
-from labcrane.protocol.design import Criterion
+from labcrane.protocol.design import Criterion, Switch
 
 READING_S = 120.0
 """Seconds that people are likely to spend on a page of text, or questions; for plans only."""
@@ -52,9 +52,13 @@ class Block(Section):
     ask: tuple[str, ...] = ()
     """Questionnaires after each counted trial: ``[subjective_accuracy, situational_awareness]``."""
 
-    feedback: Literal["all", "none", "group"] | tuple[str, ...] = "all"
+    feedback: Switch = "all"
     """Which feedback is switched on during its trials: ``all``, ``none``, what the participant's
     ``group`` is given, or a list of names."""
+
+    condition: PositiveInt | None = None
+    """Which of the participant's conditions it is of, from 1, in the order in which they come; the
+    condition says which feedback is on."""
 
     fading: tuple[Annotated[float, Field(ge=0.0, le=1.0)], ...] = (1.0,)
     """Share of the trials with feedback, part by part: ``[1, 0.5, 0]`` is all of the first third,

@@ -17,6 +17,7 @@ from labcrane.files.names import check_name
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
 from labcrane.protocol.components import ComponentResolver, ComponentSpec
+from labcrane.protocol.design import CONDITION, Switch
 from labcrane.protocol.protocol import DEFAULT_OPERATOR, Protocol, read
 from labcrane.protocol.references import Parts, ReferenceChecker, twice
 from labcrane.protocol.steps import Block
@@ -184,6 +185,16 @@ def trials_of(block: Block, protocol: Protocol, task: Task) -> tuple[float, floa
     return len(once) * share, sum(trial.expected_s for trial in once) * share
 
 
+NO_CONDITIONS = (
+    "design has no conditions; write them under design:, with the feedback of each, as conditions: "
+    "{plain: none, helped: all}"
+)
+NO_GROUPS = (
+    "feedback is by group, but design has no groups; write them under design:, or feedback: all, "
+    "none or a list of names"
+)
+
+
 class Checker:
     """Notes what a protocol asks of its parts and they do not have."""
 
@@ -197,6 +208,8 @@ class Checker:
         self._check_blocks(tasks)
         if len(tasks) == len(self._protocol.tasks):
             self._check_order(tasks)
+        self._check_conditions(tasks)
+        self._check_blocks_of_conditions()
         self._check_stop_rules(asked)
         if self._source.recorded:
             return  # what follows changes nothing of what was run, and was once accepted
@@ -356,6 +369,8 @@ class Checker:
         """Note ordered factors that no task has, or whose levels cannot come in that order."""
         known = {factor for task in tasks.values() for factor in task.factors()}
         for factor in self._protocol.design.order:
+            if factor == CONDITION:
+                continue  # its own check
             if factor not in known:
                 message = (
                     f"no task varies {factor!r}; {nearest(factor, sorted(known), 'they vary')}"
@@ -370,6 +385,46 @@ class Checker:
                     place = ("design", "order", factor, "in_a_row")
                     self._source.problem(place, f"{factor} of task {name!r} has {why}")
 
+    def _check_conditions(self, tasks: Mapping[str, Task]) -> None:
+        """Note conditions whose feedback, order or column of the trial table there cannot be."""
+        design, at = self._protocol.design, ("design", "order", CONDITION)
+        order = design.order.get(CONDITION)
+        if order and not (
+            design.conditions or any(CONDITION in t.factors() for t in tasks.values())
+        ):
+            self._source.problem(at, NO_CONDITIONS, key=True)
+        elif order and design.conditions and (why := order.why_not(len(design.conditions))):
+            self._source.problem((*at, "in_a_row"), f"{CONDITION} has {why}")
+        for name, task in tasks.items() if design.conditions else ():
+            if any(CONDITION in trial.condition for trial in task.plan(task.factors())):
+                message = (
+                    f"task {name!r} has a {CONDITION} of its own, and design has conditions; both "
+                    "would be one column of the trial table: drop one of them"
+                )
+                self._source.problem(("tasks", name), message)
+
+    def _check_blocks_of_conditions(self) -> None:
+        """Note blocks of conditions that there are not, or with feedback of their own."""
+        design = self._protocol.design
+        for place, block in self._blocks():
+            if block.condition is None:
+                continue
+            if not design.conditions:
+                message = NO_CONDITIONS
+            elif block.condition > design.positions:
+                message = (
+                    f"condition is {block.condition}, and each participant has {design.positions} "
+                    f"of {', '.join(design.conditions)}; write 1 to {design.positions}"
+                )
+            elif "feedback" in block.model_fields_set:
+                message = (
+                    "the block has a condition, which says which feedback is on, and feedback; "
+                    "drop one of them"
+                )
+            else:
+                continue
+            self._source.problem((*place, CONDITION), message)
+
     def _check_stop_rules(self, asked: Mapping[str, Questionnaire]) -> None:
         """Note stop rules on scores that a questionnaire does not have."""
         for number, rule in enumerate(self._protocol.stop_rules):
@@ -383,18 +438,19 @@ class Checker:
                 )
 
     def _check_feedback(self) -> None:
-        """Note groups, and blocks, that are given feedback that there is not."""
+        """Note groups, conditions and blocks that are given feedback that there is not."""
         for group, names in self._protocol.design.groups.items():
             self._feedback_exists(("design", "groups", group), names)
-        for place, block in self._blocks():
-            if block.feedback == "group" and not self._protocol.design.groups:
-                message = (
-                    "feedback is by group, but design has no groups; write them under design:, or "
-                    "feedback: all, none or a list of names"
-                )
-                self._source.problem((*place, "feedback"), message)
-            elif isinstance(block.feedback, tuple):
-                self._feedback_exists((*place, "feedback"), block.feedback)
+        switches: dict[Place, Switch] = {
+            ("design", "conditions", name): switch
+            for name, switch in self._protocol.design.conditions.items()
+        }
+        switches |= {(*place, "feedback"): block.feedback for place, block in self._blocks()}
+        for at, switch in switches.items():
+            if switch == "group" and not self._protocol.design.groups:
+                self._source.problem(at, NO_GROUPS)
+            elif isinstance(switch, tuple):
+                self._feedback_exists(at, switch)
 
     def _feedback_exists(self, place: Place, names: Sequence[str]) -> None:
         for at, name in enumerate(names):

@@ -173,7 +173,9 @@ def _shortened(steps: Sequence[PlannedStep]) -> Iterator[PlannedStep]:
             yield replace(step, seconds=min(step.seconds, BREAK_S))
             continue
         block = step.block
-        kind = (block.name, block.task, block.practice, block.reference, block.ask)
+        kind = (
+            block.name, block.task, block.practice, block.reference, block.ask, block.condition,
+        )  # fmt: skip
         if kind not in seen:
             seen.add(kind)
             yield replace(step, block=replace(block, trials=_until_counted(block.trials)))

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from labcrane.analysis.quality import is_result
 from labcrane.analysis.report import outcomes
 from labcrane.analysis.report.factors import (
     BLOCK,
+    CONDITION,
     DISTANCE,
     GROUP,
     PHASE,
@@ -83,11 +84,18 @@ class PlannedTest:
     factors: Factors
     people: Mapping[str, str]
 
+    @property
+    def levels(self) -> list[Any]:
+        """The levels of its factor in these movements."""
+        asked = column(self.effect.factor, self.factors)
+        if asked == CONDITION:  # some blocks are of none
+            return list(self.factors.conditions)
+        return sorted(self.results[asked].unique())
+
     @cached_property
     def pair(self) -> tuple[str, str]:
         """The two levels of a contrast, as the report names them: the second less the first."""
-        levels = sorted(self.results[column(self.effect.factor, self.factors)].unique())
-        one, other = map(outcomes.word, pair_of(self.effect, levels))
+        one, other = map(outcomes.word, pair_of(self.effect, self.levels))
         return one, other
 
     @property
@@ -169,7 +177,7 @@ def plan_test(
     factors = factors_of(table)
     results = table[is_result(table)]
     wanted = ["participant", "pair", "distance", "difficulty", "far_side", SEQUENCE, GROUP, PHASE]
-    wanted += [SESSION, BLOCK, PLACE]
+    wanted += [SESSION, BLOCK, PLACE, CONDITION]
     kept = [name for name in (*wanted, effect.measure) if name in results]
     everybody = dict(people or people_of(movements))
     planned = PlannedTest(kind, effect, results[kept].reset_index(drop=True), factors, everybody)
@@ -183,7 +191,7 @@ def plan_test(
 
 
 def _check(planned: PlannedTest) -> None:
-    kind, effect, results = planned.kind, planned.effect, planned.results
+    kind, effect = planned.kind, planned.effect
     if kind == "contrast" and not effect.between:
         raise ProtocolError(
             f"a contrast is of two levels; write {effect.measure}~{effect.factor}[ONE,OTHER]"
@@ -205,7 +213,7 @@ def _check(planned: PlannedTest) -> None:
             f"{', '.join(there) or 'none here'}"
         )
     if kind == "contrast":
-        pair_of(effect, sorted(results[column(effect.factor, planned.factors)].unique()))
+        pair_of(effect, planned.levels)
 
 
 def names(planned: PlannedTest) -> list[str]:
@@ -219,6 +227,7 @@ def names(planned: PlannedTest) -> list[str]:
             return list(dict.fromkeys(found))
         case "contrast":
             there = [*factors.between, *factors.over_phases, DISTANCE]
+            there += [CONDITION] * bool(factors.conditions)
             return [outcomes.named_factor(each, factors) for each in there if each in results]
         case "trend":
             return [SEQUENCE]
@@ -249,6 +258,8 @@ def _contrast(planned: PlannedTest, results: "pd.DataFrame") -> ReportedTest:
     one, other = planned.pair
     within = [*factors.over_phases, *[name for name in (effect.factor,) if name == DISTANCE]]
     asked = column(effect.factor, factors)
+    if asked == CONDITION:
+        results, within = outcomes.CONDITIONS.of(results), [CONDITION]
     for row in compare(results, effect.measure, asked, within, factors.between):
         if {row.first, row.second} == {one, other}:
             # Other minus one, as the effect is written; the report's is first minus second.

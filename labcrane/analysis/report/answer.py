@@ -8,6 +8,7 @@ from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.presented import not_presented
 from labcrane.analysis.quality import is_result, without_onset
 from labcrane.analysis.report.factors import (
+    CONDITION,
     DISTANCE,
     GROUP,
     PHASE,
@@ -88,6 +89,8 @@ def _columns(factors: Factors) -> Iterator[tuple[str, str, str]]:
     """Yield the name of each factor in the tests, its column, and the unit of its levels."""
     if factors.groups:
         yield GROUP, GROUP, ""
+    if factors.conditions:
+        yield CONDITION, CONDITION, ""
     for name in factors.over_phases:
         yield named_factor(name, factors), name, ""
     yield DISTANCE, DISTANCE, " m"
@@ -193,6 +196,8 @@ def _effect(
     own = own[~own["participant"].isin(str(row["left_out"]).split())]
     by = [column, "participant"]
     within = [each for each in results.factors.over_phases if each != column]
+    if column == CONDITION:  # each has its own phases, and a test of the means of all trials
+        own, within = own[own[CONDITION].fillna("") != ""], []
     cells = own.groupby([*by, *within])[measure].mean().dropna()
     each = cells.groupby(level=by).mean().groupby(level=0)
     means, sizes = each.mean(), dict(each.size())

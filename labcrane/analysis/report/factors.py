@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 GROUP, PHASE, PLACE = "group", "phase", "place"
 SESSION, BLOCK = "of_session", "of_block"
 DISTANCE, SIDE = "distance", "far_side"
+CONDITION = "condition"
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +34,8 @@ class Factors:
     crossed
         Levels of session and block where both vary and each session has the same blocks; they are
         two factors then, and otherwise phases are one.
+    conditions
+        Within participants, two or more, in whatever order each had them; otherwise empty.
     people
         Everybody in the sample, also who has no movement, and their group.
     """
@@ -45,6 +48,7 @@ class Factors:
     targets: dict[str, tuple[Any, ...]]
     crossed: dict[str, tuple[Any, ...]]
     people: dict[str, str]
+    conditions: tuple[str, ...] = ()
 
     @property
     def between(self) -> list[str]:
@@ -70,9 +74,8 @@ class Factors:
         """Return the levels of a column that were to be done; a phase of few places has fewer."""
         if column == PLACE:
             return tuple(map(float, range(1, max(self.places.values(), default=0) + 1)))
-        return {GROUP: self.groups, PHASE: self.phases, **self.targets, **self.crossed}.get(
-            column, ()
-        )
+        own = {GROUP: self.groups, PHASE: self.phases, CONDITION: self.conditions}
+        return {**own, **self.targets, **self.crossed}.get(column, ())
 
     @property
     def alike(self) -> bool:
@@ -164,7 +167,16 @@ def factors_of(table: "pd.DataFrame", people: Mapping[str, str] | None = None) -
         first = table.drop_duplicates("participant")
         people = dict(zip(map(str, first["participant"]), map(str, first[GROUP]), strict=True))
     practice = len(counted) < len(table)
-    return Factors(several, phases, kind, places, practice, targets, crossed, dict(people))
+    own = conditions_in(counted)
+    return Factors(several, phases, kind, places, practice, targets, crossed, dict(people), own)
+
+
+def conditions_in(table: "pd.DataFrame") -> tuple[str, ...]:
+    """Return the conditions within participants that movements are of, where there are several."""
+    if CONDITION not in table:
+        return ()
+    named = {str(name) for name in table[CONDITION].dropna().unique() if name != ""}
+    return tuple(sorted(named)) if len(named) > 1 else ()
 
 
 def _crossed(counted: "pd.DataFrame") -> dict[str, tuple[Any, ...]]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from labcrane.analysis.quality import is_done
 from labcrane.analysis.report.factors import (
     BLOCK,
+    CONDITION,
     DISTANCE,
     GROUP,
     PHASE,
@@ -36,6 +37,7 @@ ADJUSTED = f" with {TAKEN}"
 SEQUENCE = "sequence"
 
 PAIRS = "pairs of targets"
+ORDER = ("the order in which conditions came", (PHASE,))
 POSITIONS = ("positions", (PHASE, PLACE))
 """What an effect may not be told from: positions hold learning, and pairs their distance."""
 
@@ -71,6 +73,8 @@ class Plan:
 
     def of(self, results: "pd.DataFrame") -> "pd.DataFrame":
         """Return the movements that are in it."""
+        if CONDITION in self.within:  # blocks beside them are of none
+            results = results[results[CONDITION].fillna("") != ""]
         return results[results[PHASE] == self.phase] if self.phase else results
 
     def confounded(self, results: "pd.DataFrame", measure: str) -> str:
@@ -79,8 +83,14 @@ class Plan:
         if not words:
             return ""
         known = self.of(results).dropna(subset=[measure])
-        apart = told_apart(known, self.asked, [("participant", PHASE), columns])
+        # A condition is all of a participant's phase: it is told from phases over participants.
+        person = ("participant",) if CONDITION in self.asked else ("participant", PHASE)
+        apart = told_apart(known, self.asked, [person, columns])
         return "" if apart else words
+
+
+CONDITIONS = Plan((CONDITION,), (CONDITION,), confusable=ORDER)
+"""Conditions within participants, over the means of all their blocks."""
 
 
 def measures_in(results: "pd.DataFrame", primary: Sequence[str] = ()) -> list[str]:
@@ -133,6 +143,8 @@ def plans(results: "pd.DataFrame", factors: Factors) -> Iterator[Plan]:
     pair = pair_of(results)
     # First, because most participants are whole there.
     yield Plan(phases)
+    if factors.conditions:
+        yield CONDITIONS
     # Positions of phases of unequal length have nothing to do with each other.
     confusable = (PAIRS, (pair,)) if pair else ("", ())
     for phase in ("",) if factors.alike else factors.phases:
@@ -217,6 +229,14 @@ def contrast_table(
             replace(one, confounded=confounded)
             for one in compare(results, measure, DISTANCE, plan.within, between)
         ]
+        if factors.conditions:
+            confounded = CONDITIONS.confounded(results, measure)
+            found += [
+                replace(one, confounded=confounded)
+                for one in compare(
+                    CONDITIONS.of(results), measure, CONDITION, CONDITIONS.within, between
+                )
+            ]
     named = [replace(one, factor=named_factor(one.factor, factors)) for one in found]
     return pd.DataFrame([_row(one, factors.people) for one in named])
 

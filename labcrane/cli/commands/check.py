@@ -169,6 +169,7 @@ def _row(session: "SessionPlan") -> dict[str, object]:
                 "name": block.name,
                 "practice": block.practice,
                 "group": block.group,
+                "condition": block.condition,
                 "trials": sum(trial.planned.counted for trial in block.trials),
                 "levels": {factor: list(levels) for factor, levels in block.levels.items()},
                 "expected_s": block.expected_s,
@@ -212,7 +213,8 @@ def _print(plans: "Sequence[SessionPlan]") -> None:
 def _block(block: "PlannedBlock") -> str:
     counted = sum(trial.planned.counted for trial in block.trials)
     practice = " (practice)" if block.practice else ""
-    orders = [f"{factor}: {', '.join(levels)}" for factor, levels in block.levels.items()]
+    orders = [f"condition: {block.condition}"] * bool(block.condition)
+    orders += [f"{factor}: {', '.join(levels)}" for factor, levels in block.levels.items()]
     asked = [f"after each: {', '.join(block.ask)}"] if block.ask else []
     about = f"{counted} trials, {block.expected_s / 60:.1f} minutes"
     if block.track is not None:

@@ -1,0 +1,140 @@
+"""A crossover of two conditions in the report: the effect put in, against SciPy and statsmodels."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from rehearsal import SHORT
+from scipy.stats import ttest_rel
+from statsmodels.stats.anova import AnovaRM
+
+from labcrane.analysis.report import outcomes
+from labcrane.analysis.report.factors import factors_of, with_factors
+from labcrane.cli.app import main
+from labcrane.simulation.power import Claim, read_effect
+from labcrane.simulation.reported import ask, plan_test
+
+EFFECT = 0.6
+
+
+def crossover(
+    seed: int, people: int, names: tuple[str, ...], *, balanced: bool = True
+) -> pd.DataFrame:
+    """Return movements of people who learn a lot; the last condition takes ``EFFECT`` longer."""
+    dice = np.random.default_rng(seed)
+    rows = []
+    for person in range(people):
+        pace, own = dice.normal(3.0, 0.6), dice.normal(0.0, 0.1)
+        turn = person % len(names) if balanced else 0
+        order = names[turn:] + names[:turn]
+        for block, name in enumerate(order, start=1):
+            for pair, (distance, side) in enumerate(
+                (d, s) for d in (2.0, 4.0) for s in ("left", "right")
+            ):
+                for _ in range(2):
+                    time = pace - 0.7 * block + 0.2 * distance + dice.normal(0.0, 0.2)
+                    time += (EFFECT + own) * (name == names[-1])
+                    rows.append(
+                        {"participant": f"P{person:03}", "session": 1, "session_name": "only",
+                         "block": block, "block_name": f"b{block}", "condition": name,
+                         "sequence": 4 * (block - 1) + pair + 1, "trial": len(rows) + 1,
+                         "distance": distance, "far_side": side, "difficulty": distance / 0.5,
+                         "movement_time": time + 3.0, "practice": 0, "outcome": "success"}
+                    )  # fmt: skip
+    return with_factors(pd.DataFrame(rows))
+
+
+def of_condition(table: pd.DataFrame, movements: pd.DataFrame) -> pd.Series:
+    rows = table(movements, factors_of(movements))
+    (found,) = [row for _, row in rows.iterrows() if row["factor"] == "condition"]
+    return found
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_two_conditions_are_compared_as_a_paired_test_does_and_the_effect_is_found(
+    seed: int,
+) -> None:
+    movements = crossover(seed, 16, ("plain", "tone"))
+    means = movements.groupby(["participant", "condition"])["movement_time"].mean().unstack()
+    theirs = ttest_rel(means["plain"], means["tone"])
+    anova = of_condition(outcomes.anova_table, movements)
+    assert anova["f"] == pytest.approx(theirs.statistic**2)
+    assert (anova["df1"], anova["df2"], anova["n"]) == (1, 15, 16)
+    assert anova["p"] == pytest.approx(theirs.pvalue)
+    assert not anova["confounded"]
+    contrast = of_condition(outcomes.contrast_table, movements)
+    assert contrast["difference"] == pytest.approx((means["plain"] - means["tone"]).mean())
+    low, high = theirs.confidence_interval(0.95)
+    assert (contrast["ci_low"], contrast["ci_high"]) == pytest.approx((low, high))
+    assert abs(contrast["difference"] + EFFECT) < 3.0 * contrast["se"]
+
+
+def test_three_conditions_are_tested_as_statsmodels_does() -> None:
+    movements = crossover(5, 18, ("a", "b", "c"))
+    theirs = (
+        AnovaRM(
+            movements, "movement_time", "participant", within=["condition"], aggregate_func="mean"
+        )
+        .fit()
+        .anova_table.iloc[0]
+    )
+    ours = of_condition(outcomes.anova_table, movements)
+    assert (ours["f"], ours["p"]) == pytest.approx((theirs["F Value"], theirs["Pr > F"]))
+    assert (ours["df1"], ours["df2"]) == (2, 34)
+
+
+def test_who_lacks_a_condition_is_left_out_by_name() -> None:
+    movements = crossover(2, 10, ("plain", "tone"))
+    gone = (movements["participant"] == "P003") & (movements["condition"] == "tone")
+    ours = of_condition(outcomes.anova_table, movements[~gone])
+    assert (ours["n"], ours["left_out"]) == (9, "P003")
+
+
+def test_conditions_in_one_order_for_everybody_cannot_be_told_from_it() -> None:
+    alike = crossover(2, 10, ("plain", "tone"), balanced=False)
+    said = "the order in which conditions came"
+    assert of_condition(outcomes.anova_table, alike)["confounded"] == said
+    assert of_condition(outcomes.contrast_table, alike)["confounded"] == said
+
+
+def test_power_tests_the_difference_of_conditions_as_the_report_does() -> None:
+    movements = crossover(3, 16, ("plain", "tone"))
+    effect = read_effect("movement_time~condition[plain,tone]")
+    planned = plan_test("contrast", effect, movements, Claim("difference"))
+    answer = ask(planned, planned.results)
+    reported = of_condition(outcomes.contrast_table, movements)
+    assert abs(answer.estimate) == pytest.approx(abs(reported["difference"]))
+    assert answer.p == pytest.approx(reported["p"])
+
+
+STUDY = SHORT.replace(
+    "sessions:",
+    """\
+feedback: {tone: {use: sonification}}
+design:
+  conditions: {plain: none, tone: [tone]}
+  order: {condition: latin_square, pairs: shuffled}
+participants: {pattern: 'P\\d{3}', planned: 4}
+sessions:""",
+).replace(
+    "      - block: {task: aiming, pairs: 1}\n",
+    "      - block: {task: aiming, condition: 1}\n      - block: {task: aiming, condition: 2}\n",
+)
+
+
+@pytest.mark.slow
+def test_a_crossover_goes_from_its_protocol_to_its_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    protocol, data, report = (tmp_path / name for name in ("study.yaml", "data", "report"))
+    protocol.write_text(STUDY)
+    assert main(["check", str(protocol)]) == 0
+    assert main(["plan", str(protocol), "--participants", "4"]) == 0
+    said = capsys.readouterr().out
+    assert said.count("condition: tone") == said.count("condition: plain") == 4
+    assert main(["simulate", str(protocol), "--participants", "4", "--out", str(data)]) == 0
+    assert main(["report", str(data), "--include", "simulated", "--out", str(report)]) == 0
+    tested = pd.read_csv(report / "tables" / "anova.csv")
+    assert "condition" in set(tested["factor"])
+    assert "over condition" in (report / "results.md").read_text()
