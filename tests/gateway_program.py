@@ -13,11 +13,11 @@ for joint in JOINTS:
 outlet = pylsl.StreamOutlet(info)
 seconds, most = float(sys.argv[1]), 0.0
 flow, flows = None, pylsl.ContinuousResolver(prop="name", value="gateway.flow")
-began = time.monotonic()
-while time.monotonic() - began < seconds:
+began = None  # when the session's own stream was found
+while began is None or time.monotonic() - began < seconds:
     outlet.push_sample([0.0, 120.0, 0.0, 0.0])
     if flow is None and (found := flows.results()):
-        flow = pylsl.StreamInlet(found[0])
+        flow, began = pylsl.StreamInlet(found[0]), time.monotonic()
     if flow is not None:
         while (sample := flow.pull_sample(timeout=0.0))[1] is not None:
             most = max(most, sample[0][1])

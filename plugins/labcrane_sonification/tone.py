@@ -73,7 +73,7 @@ STEPS = 400
 """Distances at which the softest tone is looked for."""
 
 
-def a_weight(hertz: FloatArray) -> FloatArray:
+def weighted(hertz: FloatArray) -> FloatArray:
     """Return the A-weighting of frequencies as a factor of amplitude; 1 at 1 kHz.
 
     IEC 61672-1, annex E.
@@ -91,7 +91,7 @@ def heard(pitch: float, overtones: float) -> float:
     That of a sine of 1 kHz that is as loud: powers of partials add.
     """
     numbers = np.arange(1.0, 2.0 + overtones)
-    return float(np.linalg.norm(a_weight(pitch * numbers) / numbers))
+    return float(np.linalg.norm(weighted(pitch * numbers) / numbers))
 
 
 @lru_cache(maxsize=16)

@@ -24,7 +24,8 @@ tasks:
   aiming: {{use: aiming, distances: [2], movements: 20, limit_s: 1.2}}
 feedback:
   ball: {{use: sphere, far: 4.0}}
-  tone: {{use: sonification, driver: jack, block: 1024, far: 4.0, aside: 2.0, silent_after_s: null}}
+  tone: {{use: sonification, driver: jack, block: 1024, far: 4.0, aside: 2.0, silent_after_s: null,
+    weighting: none}}
 views:
   window: {{use: view, display: hidden, renderer: software, size: [160, 90], rate_hz: 30}}
 sessions:

@@ -76,7 +76,7 @@ def test_a_program_written_from_the_documentation_drives_the_arm(tmp_path: Path)
                 moved = frame.state[arm], frame.command[signal].tolist()
                 seen.append((frame.tick.woke, frame.paused, *moved, frame.events))
 
-            console = ScriptedConsole({240 * 10: [Command(Order.END)]})
+            console = EndsWhenLostTwice(seen)
             loop.run(rig, run, sequencer, SystemClock(), console, NoLog(), [keep])
         output, _ = program.communicate(timeout=240)
     finally:
@@ -91,6 +91,19 @@ def test_a_program_written_from_the_documentation_drives_the_arm(tmp_path: Path)
     assert names.count("input.lost") == 2  # before it was there, and after it had gone
     assert seen[-1][1]
     assert seen[-1][3] == [0.0] * 4
+
+
+class EndsWhenLostTwice(ScriptedConsole):
+    """Ends the session once the program has come and gone, and a while later at the latest."""
+
+    def __init__(self, seen: Sequence[tuple]) -> None:
+        super().__init__()
+        self._seen, self._lost, self._read = seen, 0, 0
+
+    def commands(self) -> list[Command]:
+        news, self._read = self._seen[self._read :], len(self._seen)
+        self._lost += sum(event.name == "input.lost" for each in news for event in each[4])
+        return [Command(Order.END)] if self._lost == 2 or self._read > 240 * 90 else []
 
 
 def station_outlet(name: str, labels: Sequence[str]) -> pylsl.StreamOutlet:

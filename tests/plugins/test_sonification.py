@@ -18,7 +18,7 @@ from labcrane.testing import TARGETS, FeedbackContract, ch8, make_run, make_targ
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.sonification import Sonification
 from labcrane_sonification.synth import Synth, offline_server
-from labcrane_sonification.tone import Tone, a_weight, gains, tone
+from labcrane_sonification.tone import Tone, gains, tone, weighted
 from labcrane_sphere.settings import SphereSettings
 
 RATE = 48000
@@ -264,7 +264,7 @@ def test_the_weighting_is_that_of_the_standards_table() -> None:
     """IEC 61672-1, table 3, in dB to one decimal."""
     table = {63.0957: -26.2, 125.893: -16.1, 251.189: -8.6, 501.187: -3.2, 1000.0: 0.0,
              1995.26: 1.2, 3981.07: 1.0, 7943.28: -1.1, 15848.9: -6.6}  # fmt: skip
-    ours = 20.0 * np.log10(a_weight(np.array(list(table))))
+    ours = 20.0 * np.log10(weighted(np.array(list(table))))
     np.testing.assert_allclose(ours, list(table.values()), atol=0.051)
 
 
