@@ -77,7 +77,7 @@ def _design(protocol: Mapping[str, Any]) -> list[str]:
     design = protocol.get("design", {})
     conditions, orders = design.get("conditions", {}), design.get("order", {})
     if conditions:
-        listed = ", ".join(f"{name}, {_given(given)}" for name, given in conditions.items())
+        listed = "; ".join(f"{name} {_given(given)}" for name, given in conditions.items())
         said.append(f"Every participant had {len(conditions)} conditions ({listed})")
         orders = {"condition": "as_written", **orders}
     for factor, order in orders.items():

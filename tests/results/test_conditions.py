@@ -138,3 +138,11 @@ def test_a_crossover_goes_from_its_protocol_to_its_report(
     tested = pd.read_csv(report / "tables" / "anova.csv")
     assert "condition" in set(tested["factor"])
     assert "over condition" in (report / "results.md").read_text()
+    (tmp_path / "consent.txt").write_text("I agree.")
+    approval = ["--board", "B", "--reference", "1", "--valid-until", "2099-12-31", "--consent"]
+    assert main(["approve", str(protocol), *approval, str(tmp_path / "consent.txt")]) == 0
+    capsys.readouterr()
+    assert main(["methods", str(protocol)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "had 2 conditions (plain without feedback; tone with the feedback tone)" in said
+    assert "The levels of condition came in the orders of a Latin square" in said
