@@ -248,31 +248,39 @@ def _of_repeats(study: Study) -> Doubts:
         for name in twice(names):
             again = len(names) - 1 - names[::-1].index(name)
             yield (*place, again), f"{key_of(place)} has {name!r} twice"
-    yield from _of_what_groups_learn(study)
-
-
-def _of_what_groups_learn(study: Study) -> Doubts:
-    """Question groups that are given the same, and those that are told different facts."""
-    told: dict[frozenset[str], str] = {}
     given: dict[frozenset[str], str] = {}
-    parts = {**study.cues, **study.sounds}
-    for name, feedback in study.protocol.design.groups.items():
-        facts = frozenset(fact for each in feedback for fact in parts[each].settings.reveals())
-        if facts and facts not in told:
-            for others, group in told.items():
-                more = [*sorted(facts - others), *sorted(others - facts)]
-                yield (
-                    ("design", "groups", name),
-                    f"groups {group!r} and {name!r} are not told the same: only one of them learns "
-                    f"{' and '.join(more)}, so that the way of telling cannot be told from what is "
-                    "told",
-                )
-            told[facts] = name
+    for name, feedback in design.groups.items():
         if (other := given.setdefault(frozenset(feedback), name)) != name:
             yield (
                 ("design", "groups", name),
                 f"groups {other!r} and {name!r} are given the same feedback",
             )
+    yield from _of_what_is_told(study)
+
+
+def _of_what_is_told(study: Study) -> Doubts:
+    """Question groups, and conditions, in which people are told different facts by other means."""
+    design, parts = study.protocol.design, {**study.cues, **study.sounds}
+    meant = {"all": tuple(parts), "none": (), "group": ()}
+    conditions = {
+        name: switch if isinstance(switch, tuple) else meant[switch]
+        for name, switch in design.conditions.items()
+    }
+    for key, some in (("groups", design.groups), ("conditions", conditions)):
+        told: dict[frozenset[str], str] = {}
+        for name, feedback in some.items():
+            facts = frozenset(fact for each in feedback for fact in parts[each].settings.reveals())
+            if not facts or facts in told:
+                continue
+            for others, other in told.items():
+                more = [*sorted(facts - others), *sorted(others - facts)]
+                yield (
+                    ("design", key, name),
+                    f"{key} {other!r} and {name!r} are not told the same: in only one of them "
+                    f"people learn {' and '.join(more)}, so that the way of telling cannot be told "
+                    "from what is told",
+                )
+            told[facts] = name
 
 
 def _of_components(study: Study) -> Doubts:

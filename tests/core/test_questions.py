@@ -126,7 +126,7 @@ UNLIKE = [
           (BLOCK, BLOCK.replace("pairs", "feedback: group, pairs"))],
          "design.groups.ball", "groups 'all' and 'ball' are given the same feedback"),
         ([("sessions:", f"{UNEQUAL}sessions:"), (BLOCK, BLOCK.replace("pairs", "feedback: group, pairs"))],
-         "design.groups.heard", "only one of them learns on which side the target is and whether the tip is inside the target, so"),
+         "design.groups.heard", "in only one of them people learn on which side the target is and whether the tip is inside the target, so"),
         ([(BLOCK, BLOCK.replace("pairs", "ask: [nasa_tlx, nasa_tlx], pairs"))],
          "sessions.1.steps.1.block.ask.2", "has 'nasa_tlx' twice"),
         ([("machine: ch8", "operator: {use: simulated_operator, reaction_sd: 1e300}\nmachine: ch8")],
