@@ -26,6 +26,7 @@ ANY: dict[str, str] = {
     "Track.at_most": OWN_UNIT,
     "QuestionSettings.lowest": OWN_UNIT,
     "ForceSettings.largest": OWN_UNIT,
+    "Block.condition": A_NUMBER_OF,
     "PageSettings.port": A_NUMBER_OF,
     "SonificationSettings.device": A_NUMBER_OF,
     "ViewSettings.screen": A_NUMBER_OF,
