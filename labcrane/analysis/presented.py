@@ -39,7 +39,8 @@ class PresentedLimits(Settings):
     37, 1063-1076); a processor that draws reaches 25."""
 
     max_gap_s: PositiveFloat = 0.25
-    """Longest time without a new picture, in seconds: about a visual reaction time."""
+    """Longest time without a new picture, or with a sound that had failed, in seconds: about a
+    visual reaction time."""
 
     def too_little(self, rate_hz: float, longest_s: float) -> bool:
         """Whether so few pictures a second, or so long without one, is too little."""
@@ -77,7 +78,8 @@ PRESENTED: Mapping[str, tuple[str, str]] = {
     ),
     "feedback_lost": (
         "s",
-        "how long a view or sound of the operator had failed and was not back, pauses left out",
+        "how long a view of the operator, or a sound that was switched on, had failed and was not "
+        "back, pauses left out",
     ),
     "presentation_failed": (
         "1",
@@ -111,6 +113,7 @@ def presented(session: "SessionRecord") -> "pd.DataFrame | None":
     None where nothing was to be shown: the study has no view or sound for the operator, or the
     session was run without. A view that never showed a picture has shown 0.
     """
+    import numpy as np
     import pandas as pd
 
     trials, events = session.trials, session.events
@@ -128,21 +131,21 @@ def presented(session: "SessionRecord") -> "pd.DataFrame | None":
     clock = _Clock(session)
     spans = [clock.at(trials[edge].to_numpy(float)) for edge in ("started", "ended")]
     table = pd.DataFrame(index=trials.index, columns=list(PRESENTED), dtype=float)
+    on = [own & {*views, *names} for names in _switched_on(trials, own)]
+    table["feedback_lost"] = _lost(told, on, clock, *spans)
+    silent = _lost(told, [names - {*views} for names in on], clock, *spans)
+    limits = PresentedLimits.model_validate(session.context.get("presented", {}))
+    failed = np.array(silent) > limits.max_gap_s
     if views:
         shown = [_shown(session, name, clock, *spans) for name in views]
         table["pictures"] = pd.DataFrame([count for count, _ in shown]).min().to_numpy()
         longest = pd.DataFrame([gap for _, gap in shown]).max()
         table["longest_without_picture"] = longest.to_numpy()
-        limits = PresentedLimits.model_validate(session.context.get("presented", {}))
-        table["presentation_failed"] = [
-            float(limits.too_little(count / max(until - since, 1.0 / clock.rate_hz), gap))
+        failed |= [
+            limits.too_little(count / max(until - since, 1.0 / clock.rate_hz), gap)
             for count, gap, since, until in zip(table["pictures"], longest, *spans, strict=True)
         ]
-    lost = [clock.at(edges) for edges in _outages(told, own)]
-    table["feedback_lost"] = [
-        sum(max(0.0, min(until, over) - max(since, began)) for began, over in lost)
-        for since, until in zip(*spans, strict=True)
-    ]
+    table["presentation_failed"] = failed.astype(float)
     return table
 
 
@@ -189,6 +192,36 @@ def _shown(
     return counts, gaps
 
 
+def _switched_on(trials: "pd.DataFrame", sounds: set[str]) -> list[set[str]]:
+    """Return which feedback was on in each trial; all of it where the record does not say."""
+    if "feedback" not in trials:
+        return [sounds] * len(trials)
+    return [
+        set(names.split("+")) if isinstance(names, str) else sounds for names in trials["feedback"]
+    ]
+
+
+def _lost(
+    told: "pd.DataFrame",
+    names: Sequence[set[str]],
+    clock: _Clock,
+    since: "FloatArray",
+    until: "FloatArray",
+) -> list[float]:
+    """Return for how long one of what is named for each movement had failed, in seconds."""
+    outages = {frozenset(own): [clock.at(edges) for edges in _outages(told, own)] for own in names}
+    return [
+        sum(
+            (
+                max(0.0, min(end, over) - max(start, began))
+                for began, over in outages[frozenset(own)]
+            ),
+            0.0,
+        )
+        for own, start, end in zip(names, since, until, strict=True)
+    ]
+
+
 def _outages(told: "pd.DataFrame", own: set[str]) -> list[tuple[float, float]]:
     """Return from when to when something of the operator's had failed, on the session's clock."""
     found, lost, began = [], set[str](), 0.0
@@ -215,9 +248,16 @@ def not_presented(movements: "pd.DataFrame") -> "pd.Series[bool]":
 
 
 def in_words(movement: Mapping[Hashable, Any]) -> str:
-    """Return what was shown of a movement: ``12 pictures shown, none for 3.21 s``."""
-    gap = movement["longest_without_picture"]
-    return f"{movement['pictures']:.0f} pictures shown, none for {gap:.2f} s"
+    """Return what was shown of a movement: ``12 pictures shown, none for 3.21 s``.
+
+    What had failed is named too: ``feedback lost for 2.50 s``.
+    """
+    found, gap = [], movement["longest_without_picture"]
+    if movement["pictures"] == movement["pictures"]:  # a number: there is a view
+        found.append(f"{movement['pictures']:.0f} pictures shown, none for {gap:.2f} s")
+    if movement["feedback_lost"]:
+        found.append(f"feedback lost for {movement['feedback_lost']:.2f} s")
+    return ", ".join(found)
 
 
 def judge_presented(session: "SessionRecord") -> tuple[Finding, ...]:
@@ -229,8 +269,8 @@ def judge_presented(session: "SessionRecord") -> tuple[Finding, ...]:
     said = [f"trial {row['trial']:g}: {in_words(row)}" for row in rows[:NAMED]]
     more = f"; and {len(rows) - NAMED} more" if len(rows) > NAMED else ""
     text = (
-        f"in {len(rows)} of {len(table)} movements the operator was shown too little; averages "
-        f"leave them out ({'; '.join(said)}{more})"
+        f"in {len(rows)} of {len(table)} movements the operator was shown or played too little; "
+        f"averages leave them out ({'; '.join(said)}{more})"
     )
     advice = "close other programs, look at the graphics driver, or choose a lower quality"
     return (

@@ -182,7 +182,9 @@ def test_a_window_that_stood_still_for_3_s_leaves_out_that_movement_and_no_other
     page = left_behind(order, console.launcher.outcome, console.launcher.sync_report)
     (line,) = [each for each in page.advice if " view: " in each]
     assert f"trial {flagged['trial']:g}: " in line
-    assert page.verdict.startswith("The session is complete and saved; movements were not shown")
+    assert page.verdict.startswith(
+        "The session is complete and saved; movements were not shown or played"
+    )
     assert page.level == "bad"
 
 

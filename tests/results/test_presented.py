@@ -19,6 +19,7 @@ from labcrane.analysis.presented import (
 )
 from labcrane.analysis.quality import exclusions, is_result
 from labcrane.analysis.report.answer import _exclusions
+from labcrane.analysis.report.outcomes import practised
 from labcrane.analysis.statistics.time_outs import time_outs
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Message, Order
@@ -122,7 +123,7 @@ def test_the_sync_report_names_movements_that_were_not_shown(
     (finding,) = session.sync_report["presented"]
     assert session.sync_report["verdict"] == finding["verdict"] == "FAIL"  # 1 of 8 is over 5 %
     assert (
-        f"in 1 of {len(session.trials)} movements the operator was shown too little"
+        f"in 1 of {len(session.trials)} movements the operator was shown or played too little"
         in (finding["text"])
     )
     assert f"trial {third['trial']:g}: " in finding["text"]
@@ -167,6 +168,38 @@ def test_a_view_that_never_showed_a_picture_has_shown_none_of_any_movement(tmp_p
 
 
 @pytest.mark.slow
+def test_a_sound_that_was_lost_leaves_out_the_movements_in_which_it_was_on(tmp_path: Path) -> None:
+    text = STUDY.replace("tasks:\n", "feedback: {tone: {use: sonification}}\ntasks:\n", 1)
+    text = text.replace("{task: aiming}", "{task: aiming, feedback: [tone], fading: [1, 0]}")
+    orders = {800: [FeedbackLost("tone", "no device")], 6500: [FeedbackReady("tone", "driver x")]}
+    session = recorded(tmp_path, {}, orders, text)
+    table = measure_session(session).assign(participant="P001", session=1)
+    lost, back = (
+        session.events.loc[session.events["name"] == f"feedback.{name}", "time"].iloc[0]
+        for name in ("lost", "ready")
+    )
+    within = np.minimum(table["ended"], back) - np.maximum(table["started"], lost)
+    expected = within.clip(lower=0.0).where(table["feedback"] == "tone", 0.0)
+    np.testing.assert_allclose(table["feedback_lost"], expected, atol=1 / RATE_HZ)
+    assert not_presented(table).tolist() == (expected > 0.25).tolist()
+    assert 0 < not_presented(table).sum() < (within > 0.25).sum(), "one without sound, in between"
+    assert exclusions(table)["why"].iloc[0] == (
+        f"outcome success, feedback lost for {table['feedback_lost'].iloc[0]:.2f} s"
+    )
+    (finding,) = session.sync_report["presented"]
+    assert f": feedback lost for {table['feedback_lost'].iloc[0]:.2f} s; " in finding["text"]
+
+
+def test_practice_is_compared_with_what_was_shown_alone() -> None:
+    table = cohort_of_36().assign(outcome="success", practice=0.0, presentation_failed=0.0)
+    table.loc[table["trial"] < 3, ["practice", "presentation_failed"]] = 1.0
+    table.loc[table["trial"] == 3, "practice"] = 1.0
+    done = practised(table)
+    assert set(done.loc[done["practice"] == "practice", "trial"]) == {3}
+    assert len(done) == (table["presentation_failed"] == 0.0).sum()
+
+
+@pytest.mark.slow
 def test_where_nothing_was_to_be_shown_nothing_is_missing(tmp_path: Path) -> None:
     hidden = VIEWED.replace("{use: view}", "{use: view, display: hidden}")
     others = VIEWED.replace("{use: view}", "{use: view, seen_by: examiner}")
@@ -198,7 +231,8 @@ def test_what_was_not_shown_is_no_success_and_no_time_out_and_is_told_in_the_ans
     table.loc[table["participant"] == "P004", "presentation_failed"] = 0.0
     assert time_outs(table, ["distance"])["trials"].sum() == len(table) - 2
     assert _exclusions(table).endswith(
-        "The operator was shown too little of 2, from 1 participant: P003 trial 1, P003 trial 2."
+        "The operator was shown or played too little of 2, from 1 participant: P003 trial 1, P003 "
+        "trial 2."
     )
 
 

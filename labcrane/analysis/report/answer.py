@@ -245,7 +245,8 @@ def _exclusions(everything: "pd.DataFrame") -> str:
         people = unseen["participant"].nunique()
         who = f"{people} {'participant' if people == 1 else 'participants'}"
         said += (
-            f" The operator was shown too little of {len(unseen)}, from {who}: {listed(unseen)}."
+            f" The operator was shown or played too little of {len(unseen)}, from {who}: "
+            f"{listed(unseen)}."
         )
     still = everything[without_onset(everything)]
     return f"{said} Without an onset: {listed(still)}." if len(still) else said

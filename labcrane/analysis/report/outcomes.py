@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from labcrane.analysis.presented import not_presented
 from labcrane.analysis.quality import is_done
 from labcrane.analysis.report.factors import (
     BLOCK,
@@ -197,8 +198,8 @@ def practice_table(
 
 
 def practised(everything: "pd.DataFrame") -> "pd.DataFrame":
-    """Return what succeeded, in practice too, with that as a factor."""
-    done = everything[is_done(everything)].copy()
+    """Return what succeeded and was shown, in practice too, with that as a factor."""
+    done = everything[is_done(everything) & ~not_presented(everything)].copy()
     return done.assign(practice=practice_words(done))
 
 
