@@ -60,6 +60,8 @@ def test_below_each_figure_stands_that_it_is_of_no_people(folder: Path, cohort: 
             if "<!-- SIMULATED -->" in text or ">SIMULATED</text>" in text}  # fmt: skip
     assert made == {name for name in said if "/P0" not in name or "SIMULATED" in name}
     assert 0 < len(made) < len(said)
+    for name in ("results.md", "results.tex"):
+        assert (folder / name).read_text(encoding="utf-8").startswith("SIMULATED.\n\n")
 
 
 def test_a_footer_is_below_the_panels_and_makes_the_figure_higher(tmp_path: Path) -> None:

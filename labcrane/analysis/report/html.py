@@ -34,7 +34,7 @@ class Page:
     prefix
         Put before the names of pictures and tables: the participant, on their page.
     footer
-        Below every figure, which others take out of the page: ``SIMULATED``.
+        Below every figure, and above every text, which others take out of the page: ``SIMULATED``.
     """
 
     def __init__(
@@ -78,8 +78,9 @@ class Page:
         )
 
     def text(self, name: str, text: str) -> None:
-        """Write a text beside the page, and link to it."""
-        (self._root / name).write_text(text, encoding="utf-8")
+        """Write a text beside the page, with the footer in its first line, and link to it."""
+        said = f"{self._footer}.\n\n" if self._footer else ""
+        (self._root / name).write_text(said + text, encoding="utf-8")
         self.links({name: f"{self._up}{name}"})
 
     def draw(self, drawing: Drawing) -> None:
