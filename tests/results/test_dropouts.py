@@ -205,6 +205,15 @@ def test_a_time_out_is_told_from_a_session_that_somebody_never_came_to(found: Fo
     assert "Without P005, tested over session, distance, far_side: nothing recorded at" in said
 
 
+def test_who_succeeded_unseen_is_said_to_have_no_success_that_was_shown(found: Found) -> None:
+    movements = drawn(1, (4, 5))
+    unseen = (movements["participant"] == "P002") & (movements["session"] == 2)
+    results, _ = found(movements.assign(presentation_failed=unseen.astype(float)))
+    said = in_words(results)
+    assert "no success that was shown at session 2 retention" in said
+    assert "no success at" not in said
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_scores_tell_those_tested_beside_all_who_answered(seed: int) -> None:
     dice = np.random.default_rng([483, seed])

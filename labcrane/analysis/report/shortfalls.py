@@ -5,7 +5,8 @@ from dataclasses import asdict, dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from labcrane.analysis.quality import is_result
+from labcrane.analysis.presented import not_presented
+from labcrane.analysis.quality import is_done, is_result
 from labcrane.analysis.report.factors import DISTANCE, GROUP, PHASE, PLACE, Factors
 from labcrane.analysis.report.outcomes import (
     ADJUSTED,
@@ -203,6 +204,7 @@ class _Design:
         self.measure, self.levels, self.people = measure, levels, people
         self._known = table.dropna(subset=[measure])
         self._done, self._recorded = table, recorded
+        self._unseen = recorded[is_done(recorded) & not_presented(recorded)]
         self.whole, self._empty = whole_people(table, measure, within)
         self._there = {
             name: [level for level in levels[name] if (self._known[name] == level).any()]
@@ -241,9 +243,11 @@ class _Design:
                 lacks = cells - _cells_of(self._known, who, list(varied))
                 recorded = _cells_of(self._recorded, who, list(varied))
                 done = _cells_of(self._done, who, list(varied))
+                unseen = _cells_of(self._unseen, who, list(varied)) - done
                 of_kind = {
                     NOTHING: lacks - recorded,
-                    "no success": (lacks & recorded) - done,
+                    "no success": (lacks & recorded) - done - unseen,
+                    "no success that was shown": lacks & unseen,
                     "no value": lacks & done,
                 }
                 said = [
