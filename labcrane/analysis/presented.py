@@ -269,10 +269,12 @@ def judge_presented(session: "SessionRecord") -> tuple[Finding, ...]:
     said = [f"trial {row['trial']:g}: {in_words(row)}" for row in rows[:NAMED]]
     more = f"; and {len(rows) - NAMED} more" if len(rows) > NAMED else ""
     text = (
-        f"in {len(rows)} of {len(table)} movements the operator was shown or played too little; "
+        f"in {len(rows)} of {len(table)} movements the operator saw or heard too little; "
         f"averages leave them out ({'; '.join(said)}{more})"
     )
     advice = "close other programs, look at the graphics driver, or choose a lower quality"
+    if any(row["feedback_lost"] for row in rows):
+        advice = "the events feedback.lost say why it failed"
     return (
         Finding(Verdict.FAIL if len(rows) > FAILED * len(table) else Verdict.WARN, text, advice),
     )

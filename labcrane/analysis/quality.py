@@ -1,18 +1,27 @@
 """Quality of loop and clocks, one row per session and per stream."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.presented import in_words, not_presented
+from labcrane.core.findings import Verdict, worst
 from labcrane.errors import RecordingError
 
 if TYPE_CHECKING:
     import pandas as pd
 
 SHOWN = 5
+
+
+def verdict_of_stamps(report: Mapping[str, Any]) -> str:
+    """Return what a recorded sync report says of time stamps alone; nothing where there is none."""
+    if "presented" not in report:
+        return str(report.get("verdict", ""))
+    judged = [*report["streams"], *filter(None, [report["loop"]]), *report["missing"]]
+    return worst(Verdict(one["verdict"]) for one in judged).value
 
 
 def loop_quality(participant: Participant) -> "pd.DataFrame":
@@ -35,7 +44,7 @@ def loop_quality(participant: Participant) -> "pd.DataFrame":
                 "participant": participant.name,
                 "session": number,
                 "clock": session.attrs.get("clock", ""),
-                "sync_verdict": session.sync_report.get("verdict", ""),
+                "sync_verdict": verdict_of_stamps(session.sync_report),
                 "not_there": ", ".join(session.sync_report.get("absent", ())),
                 "ticks": len(wrote),
                 "rate_hz": rate_hz,

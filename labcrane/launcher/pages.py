@@ -120,7 +120,7 @@ def _verdict(
         where = f" in {outcome.where}" if outcome.where else ""
         return "bad", f"The session died{where}; what it recorded until then is saved", again
     level = LEVELS[report.verdict.value if report else "PASS"]
-    doubt = "; movements were not shown or played" if report and report.presented else ""
+    doubt = "; the operator saw or heard too little" if report and report.presented else ""
     if report and LEVELS[report.of_stamps.value] != "ok":
         doubt += "; look at its time stamps"
     if outcome.owed:

@@ -515,10 +515,10 @@ def test_a_test_of_which_the_operator_saw_nothing_is_left_out_by_name(
     ]  # fmt: skip
     unseen = ", ".join(f"trial {number} of session 1" for number in (1, 2, 3))
     assert said == [
-        ("P002", f"was shown or played too little in {unseen}, which count for nothing here "
+        ("P002", f"saw or heard too little in {unseen}, which count for nothing here "
          "(presented: in the protocol)"),
     ]  # fmt: skip
     assert main(["score", str(tmp_path)]) == LEFT_OUT
-    assert f"left out: P002 was shown or played too little in {unseen}" in " ".join(
+    assert f"left out: P002 saw or heard too little in {unseen}" in " ".join(
         capsys.readouterr().out.split()
     )

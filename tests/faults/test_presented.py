@@ -180,10 +180,10 @@ def test_a_window_that_stood_still_for_3_s_leaves_out_that_movement_and_no_other
     assert exported["longest_without_picture"].max() == flagged["longest_without_picture"]
 
     page = left_behind(order, console.launcher.outcome, console.launcher.sync_report)
-    (line,) = [each for each in page.advice if " view: " in each]
+    (line,) = [each for each in page.advice if " feedback: " in each]
     assert f"trial {flagged['trial']:g}: " in line
     assert page.verdict.startswith(
-        "The session is complete and saved; movements were not shown or played"
+        "The session is complete and saved; the operator saw or heard too little"
     )
     assert page.level == "bad"
 

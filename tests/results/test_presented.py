@@ -17,10 +17,11 @@ from labcrane.analysis.presented import (
     operators_views,
     presented,
 )
-from labcrane.analysis.quality import exclusions, is_result
+from labcrane.analysis.quality import exclusions, is_result, verdict_of_stamps
 from labcrane.analysis.report.answer import _exclusions
 from labcrane.analysis.report.outcomes import practised
 from labcrane.analysis.statistics.time_outs import time_outs
+from labcrane.core.findings import Verdict, worst
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Message, Order
 from results.recorded import STUDY, record, study
@@ -123,11 +124,25 @@ def test_the_sync_report_names_movements_that_were_not_shown(
     (finding,) = session.sync_report["presented"]
     assert session.sync_report["verdict"] == finding["verdict"] == "FAIL"  # 1 of 8 is over 5 %
     assert (
-        f"in 1 of {len(session.trials)} movements the operator was shown or played too little"
+        f"in 1 of {len(session.trials)} movements the operator saw or heard too little"
         in (finding["text"])
     )
     assert f"trial {third['trial']:g}: " in finding["text"]
     assert "none for 2.02 s" in finding["text"]
+
+
+def test_a_report_and_the_study_page_tell_time_stamps_from_what_was_shown(
+    stopped: tuple[SessionRecord, pd.Series],
+) -> None:
+    report = stopped[0].sync_report
+    assert report["verdict"] == "FAIL"
+    judged = [one["verdict"] for one in report["streams"]]
+    assert verdict_of_stamps(report) == worst(map(Verdict, judged)).value != "FAIL"
+    bad = {"verdict": "FAIL"}
+    for part in ({"streams": [*report["streams"], bad]}, {"missing": [bad]}, {"loop": bad}):
+        assert verdict_of_stamps({**report, **part}) == "FAIL"
+    assert verdict_of_stamps({"verdict": "WARN", "streams": []}) == "WARN", "recorded before"
+    assert verdict_of_stamps({}) == ""
 
 
 def test_every_column_of_what_was_shown_is_in_the_codebook(
@@ -231,8 +246,7 @@ def test_what_was_not_shown_is_no_success_and_no_time_out_and_is_told_in_the_ans
     table.loc[table["participant"] == "P004", "presentation_failed"] = 0.0
     assert time_outs(table, ["distance"])["trials"].sum() == len(table) - 2
     assert _exclusions(table).endswith(
-        "The operator was shown or played too little of 2, from 1 participant: P003 trial 1, P003 "
-        "trial 2."
+        "The operator saw or heard too little of 2, from 1 participant: P003 trial 1, P003 trial 2."
     )
 
 

@@ -245,8 +245,7 @@ def _exclusions(everything: "pd.DataFrame") -> str:
         people = unseen["participant"].nunique()
         who = f"{people} {'participant' if people == 1 else 'participants'}"
         said += (
-            f" The operator was shown or played too little of {len(unseen)}, from {who}: "
-            f"{listed(unseen)}."
+            f" The operator saw or heard too little of {len(unseen)}, from {who}: {listed(unseen)}."
         )
     still = everything[without_onset(everything)]
     return f"{said} Without an onset: {listed(still)}." if len(still) else said

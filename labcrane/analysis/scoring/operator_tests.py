@@ -167,7 +167,7 @@ def _tests(
     if unseen:
         leave_out(
             recording.participant,
-            f"was shown or played too little in {', '.join(unseen)}, which count for nothing here "
+            f"saw or heard too little in {', '.join(unseen)}, which count for nothing here "
             "(presented: in the protocol)",
         )
     if lacking:

@@ -97,7 +97,7 @@ class SyncReport:
         found += [(f"{one.name}: ", finding) for one in self.streams for finding in one.findings]
         if self.loop is not None:
             found += [("loop: ", finding) for finding in self.loop.findings]
-        found += [("view: ", finding) for finding in self.presented]
+        found += [("feedback: ", finding) for finding in self.presented]
         order = list(Verdict)
         found.sort(key=lambda pair: -order.index(pair[1].verdict))
         return [f"{f.verdict} {whose}{f.text}; {f.advice}" for whose, f in found]
