@@ -269,6 +269,7 @@ def record(
     map_: Annotated[
         Path | None, typer.Option("--map", help="DBC file of what is on the bus or in the log")
     ] = None,
+    neutral: Annotated[float, typer.Option(help="value of a DBC signal at rest")] = 0.0,
     full: Annotated[float, typer.Option(help="value of a DBC signal that is full flow")] = 100.0,
     bitrate: Annotated[int, typer.Option(help="bits per second of the bus")] = 250_000,
     seconds: Annotated[float | None, typer.Option(help="stop after this time")] = None,
@@ -300,7 +301,7 @@ def record(
     elif map_ is None:
         raise ProtocolError("what is on a CAN bus only a DBC file explains; give it with --map")
     else:
-        values = CanValues(signal, angle, map_, full)
+        values = CanValues(signal, angle, map_, full, neutral)
         frames = read_log(log, values) if log else read_bus(bus or "", bitrate, values, seconds)
         samples = kept(frames, raw)
     steps = cut(_taken(samples, raw))

@@ -2,12 +2,14 @@
 
 import csv
 import math
+import re
 import sys
 import threading
 import time
 from dataclasses import replace
 from pathlib import Path
 
+import can
 import cantools
 import numpy as np
 import pandas as pd
@@ -21,7 +23,7 @@ from labcrane import DeviceError, ProtocolError, RecordingError
 from labcrane.cli.app import main
 from labcrane.machines import load_machine
 from labcrane_dmd.bench.driven import arm_settings, drive
-from labcrane_dmd.bench.sources import CanValues, read_bus
+from labcrane_dmd.bench.sources import CanValues, read_bus, read_log
 from labcrane_dmd.bench.steps import Sample, cut
 from labcrane_dmd.fit.recordings import read_recordings
 
@@ -287,6 +289,64 @@ def test_a_replayed_log_becomes_a_recording_that_fit_reads(
     wrong[2] = str(tmp_path / "wrong")
     assert main(wrong) == 1
     assert "'Encoders.Arm' is not in" in capsys.readouterr().err
+
+
+def test_an_asc_log_that_counts_from_frame_to_frame_gives_the_same_samples(
+    tmp_path: Path,
+) -> None:
+    panel, rows = panel_file(tmp_path), steps(12)[0]
+    values = CanValues("Levers.Boom", "Encoders.Boom", panel, 100.0)
+    bus_log(tmp_path / "drive.log", rows, cantools.database.load_file(panel))
+    expected = list(read_log(tmp_path / "drive.log", values))
+    with can.Logger(tmp_path / "drive.asc") as log:
+        for frame in can.LogReader(tmp_path / "drive.log"):
+            log(frame)
+    lines, was = (tmp_path / "drive.asc").read_text().split("\n"), 0.0
+    for at, line in enumerate(lines):
+        if found := re.match(r" *(\d+\.\d+)( .*)", line):
+            now = float(found[1])
+            lines[at], was = f"{now - was:11.6f}{found[2]}", now
+    text = "\n".join(lines).replace("timestamps absolute", "timestamps relative")
+    (tmp_path / "relative.asc").write_text(text)
+    for name in ("drive.asc", "relative.asc"):
+        found = list(read_log(tmp_path / name, values))
+        assert [one.value for one in found] == [one.value for one in expected]
+        times = np.array([[one.time for one in each] for each in (found, expected)])
+        # Digits of the log are millionths of a second, and differences of them add up.
+        np.testing.assert_allclose(*(times - times[:, :1]), atol=1e-6 * len(expected))
+
+
+def test_a_log_whose_clock_was_set_back_tells_no_speed(tmp_path: Path) -> None:
+    panel, rows = panel_file(tmp_path), steps(12)[0]
+    rows[40:] = [(now - 3.0, *rest) for now, *rest in rows[40:]]
+    bus_log(tmp_path / "drive.log", rows, cantools.database.load_file(panel))
+    values = CanValues("Levers.Boom", "Encoders.Boom", panel, 100.0)
+    said = r"drive.log goes back by 2\.\d+ s at its frame 81, so that no speed can be told there"
+    with pytest.raises(RecordingError, match=said):
+        list(read_log(tmp_path / "drive.log", values))
+
+
+def test_a_lever_that_rests_at_50_gives_the_same_signals(tmp_path: Path) -> None:
+    panel, rows = panel_file(tmp_path), steps(13)[0]
+    bus_log(tmp_path / "drive.log", rows, cantools.database.load_file(panel))
+    text = panel.read_text()
+    assert "Boom : 0|16@1- (0.1,0) [-100|100]" in text
+    shifted = text.replace(
+        "Boom : 0|16@1- (0.1,0) [-100|100]", "Boom : 0|16@1- (0.05,50) [0|100]", 1
+    )
+    (tmp_path / "shifted.dbc").write_text(shifted)
+    found = [
+        [one.value for one in read_log(tmp_path / "drive.log", values)]
+        for values in (
+            CanValues("Levers.Boom", "Encoders.Boom", panel, 100.0),
+            CanValues("Levers.Boom", "Encoders.Boom", tmp_path / "shifted.dbc", 100.0, 50.0),
+        )
+    ]
+    assert found[0] == pytest.approx(found[1])
+    with pytest.raises(
+        ProtocolError, match="--full is 50 and --neutral 50; full flow is a greater"
+    ):
+        CanValues("Levers.Boom", "Encoders.Boom", panel, 50.0, 50.0)
 
 
 def test_a_live_bus_gives_the_valve_commands_and_angles_that_are_on_it(tmp_path: Path) -> None:

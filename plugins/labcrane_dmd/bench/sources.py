@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from labcrane import DeviceError, RecordingError, StreamError
+from labcrane import DeviceError, ProtocolError, RecordingError, StreamError
 from labcrane.streams import NewestSample, numeric_labels
 from labcrane_dmd.bench.steps import ANGLE, SAMPLE, SIGNAL, Sample
 from labcrane_dmd.model.interpolation import FULL
@@ -28,6 +28,9 @@ WAIT_S = 0.2
 FIND_S = 10.0
 BUFFER_S = 60
 
+BACK_S = 0.01
+"""How far a frame of a log may be stamped before the one above it, in s: drivers reorder."""
+
 CLOCK_S = 5.0
 """How often the offset of the other computer's clock is asked for."""
 
@@ -43,20 +46,28 @@ class CanValues:
         ``Message.Signal`` of the DBC file; its unit there must be deg or rad.
     described
         The DBC file.
-    full
-        Value of a DBC signal that is full flow.
+    neutral, full
+        Values of a DBC signal at rest and at full flow.
     """
 
-    def __init__(self, signal: str, angle: str, described: Path, full: float) -> None:
+    def __init__(
+        self, signal: str, angle: str, described: Path, full: float, neutral: float = 0.0
+    ) -> None:
         import cantools  # noqa: PLC0415 - loads for a moment
 
+        if full <= neutral:
+            raise ProtocolError(
+                f"--full is {full:g} and --neutral {neutral:g}; full flow is a greater value than "
+                "the one at rest"
+            )
         try:
-            database: Any = cantools.database.load_file(described)
-        except (OSError, UnicodeDecodeError, cantools.database.errors.Error) as error:
+            text = _text(described)
+            database: Any = cantools.database.load_string(text, "dbc", strict=False)
+        except (OSError, cantools.database.errors.Error) as error:
             raise RecordingError(f"{described} cannot be read as a DBC file: {error}") from error
         self._file, self._database = described, database
         self._valve = int(signal) if signal.isdecimal() else None
-        self._full = full
+        self._neutral, self._full = neutral, full
         self._signal = None if self._valve is not None else self._find(signal)
         self._angle = self._find(angle)
         message, name = self._angle
@@ -79,7 +90,8 @@ class CanValues:
                 sign = {EXTEND: 1, RETRACT: -1}.get(data[2] & 0x0F, 0)
                 yield Sample(at, SIGNAL, float(sign * data[0]))
         if self._signal is not None and (value := _decoded(self._signal, frame)) is not None:
-            yield Sample(at, SIGNAL, value / self._full * FULL)
+            flow = (value - self._neutral) / (self._full - self._neutral)
+            yield Sample(at, SIGNAL, flow * FULL)
         if (value := _decoded(self._angle, frame)) is not None:
             yield Sample(at, ANGLE, value * self._degrees)
 
@@ -94,6 +106,17 @@ class CanValues:
                 f"{' and more' if len(said) > 12 else ''}"  # noqa: PLR2004 - a line of them
             )
         return there[message], name
+
+
+def _text(path: Path) -> str:
+    """Return a DBC file's text; names of signals are the same letters in every encoding."""
+    raw = path.read_bytes()
+    for encoding in ("utf-8-sig", "cp1252"):
+        try:
+            return raw.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+    return raw.decode("latin-1")
 
 
 def _decoded(which: "tuple[Message, str]", frame: "can.Message") -> float | None:
@@ -117,13 +140,23 @@ def read_log(path: Path, values: CanValues) -> Iterator[Sample]:
     Raises
     ------
     RecordingError
-        It cannot be read as one.
+        It cannot be read as one, or its clock goes back.
     """
     import can  # noqa: PLC0415 - loads for a moment
 
+    last = -math.inf
     try:
         with can.LogReader(path) as log:
-            for frame in log:
+            for number, frame in enumerate(log, 1):
+                # An asc log may count each time from the frame before it.
+                if getattr(log, "timestamps_format", "") == "relative" and number > 1:
+                    frame.timestamp += last
+                if frame.timestamp < last - BACK_S:
+                    raise RecordingError(
+                        f"the clock of {path} goes back by {last - frame.timestamp:g} s at its "
+                        f"frame {number}, so that no speed can be told there; cut the log there"
+                    )
+                last = frame.timestamp
                 yield from values.read(frame)
     except (OSError, ValueError, can.CanError) as error:
         raise RecordingError(
