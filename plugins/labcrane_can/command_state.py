@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from labcrane import ProtocolError
 from labcrane_can.avc import FULL, FrameError, State, decode
-from labcrane_can.dbc import described
+from labcrane_can.dbc import FrameKey, described, key_of, of_any_source
 from labcrane_can.settings import ValveMap
 
 if TYPE_CHECKING:
@@ -47,18 +47,18 @@ class PanelCommands:
         By joint, in the order of the settings.
     refused, why
         How many frames could not be obeyed, and the last one's reason in words.
-    foreign
-        How many frames were none of ours.
+    foreign, passed_by
+        How many frames were none of ours, and the last one's identifier in words.
     """
 
     def __init__(self, settings: ValveMap) -> None:
         self.asked = {joint: Asked() for joint in settings.valves}
-        self.refused, self.why, self.foreign = 0, "", 0
+        self.refused, self.why, self.foreign, self.passed_by = 0, "", 0, ""
         self._node, self._priority = settings.node, settings.priority
         self._timeout = settings.timeout_s
         self._joints: dict[int, str] = {}
-        self._signals: dict[int, tuple[Message, dict[str, str]]] = {}
-        self._full = settings.full
+        self._signals: dict[FrameKey, tuple[Message, dict[str, str]]] = {}
+        self._neutral, self._full = settings.neutral, settings.full
         self._broken: type[Exception] = FrameError
         if settings.map is None:
             for joint, valve in settings.valves.items():
@@ -80,7 +80,7 @@ class PanelCommands:
         elif self._signals:
             self._take_described(frame, time)
         elif not frame.is_extended_id:
-            self.foreign += 1
+            self._pass_by(frame)
         else:
             self._take_valve(frame, time)
 
@@ -115,9 +115,11 @@ class PanelCommands:
         """Return what came instead of commands, in words; empty when nothing did."""
         parts = []
         if self.refused:
-            parts.append(f"{self.refused} frames were refused, the last because {self.why}")
+            frames = "1 frame was" if self.refused == 1 else f"{self.refused} frames were"
+            parts.append(f"{frames} refused, the last because {self.why}")
         if self.foreign:
-            parts.append(f"{self.foreign} frames were not for these valves")
+            frames = "1 frame was" if self.foreign == 1 else f"{self.foreign} frames were"
+            parts.append(f"{frames} not for these valves, the last {self.passed_by}")
         return "; ".join(parts)
 
     def refuse(self, why: str) -> None:
@@ -130,6 +132,11 @@ class PanelCommands:
         for asked in self.asked.values():
             asked.signal, asked.floats, asked.wrong, asked.time = 0.0, False, "", -math.inf
 
+    def _pass_by(self, frame: CanFrame) -> None:
+        self.foreign += 1
+        kind, digits = ("extended", 8) if frame.is_extended_id else ("standard", 3)
+        self.passed_by = f"{kind} 0x{frame.arbitration_id:0{digits}X}"
+
     def _take_valve(self, frame: CanFrame, time: float) -> None:
         try:
             command = decode(frame.arbitration_id, bytes(frame.data))
@@ -137,7 +144,7 @@ class PanelCommands:
             self.refuse(str(error))
             return
         if command is None or command.valve not in self._joints or not self._ours(frame):
-            self.foreign += 1
+            self._pass_by(frame)
             return
         asked = self.asked[self._joints[command.valve]]
         asked.signal, asked.time = float(command.signal), time
@@ -145,9 +152,12 @@ class PanelCommands:
         asked.wrong = ""
 
     def _take_described(self, frame: CanFrame, time: float) -> None:
-        found = self._signals.get(frame.arbitration_id)
+        identifier = frame.arbitration_id
+        found = self._signals.get(key_of(identifier, extended=frame.is_extended_id))
+        if found is None and frame.is_extended_id:
+            found = self._signals.get(of_any_source(identifier))
         if found is None or not self._ours(frame):
-            self.foreign += 1
+            self._pass_by(frame)
             return
         message, joints = found
         if len(frame.data) < message.length:
@@ -166,12 +176,13 @@ class PanelCommands:
 
     def _take_signal(self, name: str, given: float, joint: str, time: float) -> None:
         asked = self.asked[joint]
-        value = float(given) / self._full * FULL
+        value = (float(given) - self._neutral) / (self._full - self._neutral) * FULL
         if not math.isfinite(value):
             asked.wrong = f"{name} is {given}, which is no number"
             self.refuse(asked.wrong)
         elif abs(value) > FULL * (1 + 1e-9):
-            self.refuse(f"{name} is {given}, beyond {self._full:g}")
+            least = 2 * self._neutral - self._full
+            self.refuse(f"{name} is {given}, beyond {least:g} to {self._full:g}")
         else:
             asked.signal, asked.floats, asked.time = float(round(value)), False, time
             asked.wrong = ""

@@ -25,6 +25,9 @@ def can(
             help="DBC file of a panel without valve commands; its signals' names are the joints'",
         ),
     ] = None,
+    neutral: Annotated[
+        float, typer.Option(help="value of a DBC signal at rest, where the valve is shut")
+    ] = 0.0,
     full: Annotated[float, typer.Option(help="value of a DBC signal that is full flow")] = 100.0,
     bitrate: Annotated[int, typer.Option(help="bits per second")] = 250_000,
     name: Annotated[str, typer.Option(help="name of the command stream")] = "gateway.command",
@@ -38,7 +41,9 @@ def can(
 
     valves = _valves(valve or [], map_)
     try:
-        settings = CanSettings(bus=bus, bitrate=bitrate, valves=valves, map=map_, full=full)
+        settings = CanSettings(
+            bus=bus, bitrate=bitrate, valves=valves, map=map_, neutral=neutral, full=full
+        )
     except ValidationError as error:
         raise typer.BadParameter(_said(error.errors()[0])) from None
     out.print(f"{bus} -> LSL stream {name!r}: {', '.join(valves)}; Ctrl-C ends", markup=False)

@@ -1,6 +1,7 @@
 """Settings of a panel on a CAN bus."""
 
 import re
+from collections.abc import Mapping
 from difflib import get_close_matches
 from importlib.util import find_spec
 from typing import Annotated
@@ -45,9 +46,13 @@ class ValveMap(Settings):
     map: StudyPath | None = None
     """A DBC file, for panels that send no auxiliary valve commands."""
 
-    full: PositiveFloat = 100.0
-    """Value of a DBC signal that is full flow, in the signal's own unit; minus this is full flow
-    the other way."""
+    neutral: float = 0.0
+    """Value of a DBC signal at rest, where the valve is shut, in the signal's own unit: 50 for a
+    lever that counts from 0 to 100."""
+
+    full: float = 100.0
+    """Value of a DBC signal that is full flow, in the signal's own unit; as far on the other side
+    of ``neutral`` is full flow the other way."""
 
     node: Node | None = None
     """Source address of the panel; any by default."""
@@ -66,14 +71,39 @@ class ValveMap(Settings):
             "button": [f"float.{joint}" for joint in self.valves],
         }
         if self.map is not None and self.map.exists() and find_spec("cantools"):
-            from labcrane_can.dbc import every_signal  # noqa: PLC0415 - loads for a moment
+            from labcrane_can.dbc import check_ranges, every_signal  # noqa: PLC0415 - loads for a moment
 
+            check_ranges(self)
             return {**named, "signal of the map": every_signal(self.map)}
         return named
 
     def needs(self, machine: Machine) -> Names:
         self.provides(machine)  # a file that is no map is told with the protocol
         return {}
+
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        if self.map is None or not self.map.exists() or not find_spec("cantools"):
+            return {}
+        from labcrane_can.dbc import ranges  # noqa: PLC0415 - loads for a moment
+
+        backwards = 2 * self.neutral - self.full
+        for name, (least, most) in ranges(self).items():
+            said = f"is {self.full:g}, and {name} goes from {least:g} to {most:g}"
+            if most > self.full or least < backwards:
+                return {"full": f"{said}: what is beyond {backwards:g} to {self.full:g} is refused"}
+            if most < self.full or least > backwards:
+                return {"full": f"{said}, so that the valve is never fully open"}
+        return {}
+
+    @model_validator(mode="after")
+    def _full_is_above_neutral(self) -> "ValveMap":
+        if self.full <= self.neutral:
+            raise WrongKey(
+                f"full is {self.full:g} and neutral {self.neutral:g}; full flow is a greater value "
+                "than the one at rest",
+                at=("full",),
+            )
+        return self
 
     @model_validator(mode="after")
     def _names_need_a_map(self) -> "ValveMap":

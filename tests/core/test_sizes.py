@@ -26,6 +26,8 @@ ANY: dict[str, str] = {
     "Track.at_most": OWN_UNIT,
     "QuestionSettings.lowest": OWN_UNIT,
     "ForceSettings.largest": OWN_UNIT,
+    "CanSettings.neutral": OWN_UNIT,
+    "ReplaySettings.neutral": OWN_UNIT,
     "Block.condition": A_NUMBER_OF,
     "PageSettings.port": A_NUMBER_OF,
     "SonificationSettings.device": A_NUMBER_OF,

@@ -145,8 +145,9 @@ def test_malformed_commands_are_refused_and_told_when_the_panel_is_missed(
             axes = device.read(Tick(1, now, now), make_frame(run))
             assert not axes.any()
             assert device.fault == (
-                f"no valve command for 0.25 s on {settings.bus}; 1 frames were refused, the last "
-                f"because {why}; 1 frames were not for these valves"
+                f"no valve command for 0.25 s on {settings.bus}; 1 frame was refused, the last "
+                f"because {why}; 1 frame was not for these valves, the last "
+                "extended 0x18F00425"
             )
         finally:
             device.close()

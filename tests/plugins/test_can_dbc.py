@@ -12,6 +12,7 @@ from labcrane import ProtocolError
 from labcrane.__main__ import main
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
+from labcrane.testing import ch8
 from labcrane_can.command_state import PanelCommands
 from labcrane_can.settings import ValveMap
 
@@ -104,6 +105,137 @@ def test_a_check_looks_into_the_dbc_file(panel: Path, valves: str, wrong: str, s
         load(path, discover())
     found = [each for each in str(told.value).splitlines() if f"{line}:{column}: {said}" in each]
     assert len(found) == 1, str(told.value)
+
+
+def levers(path: Path, text: str, encoding: str = "utf-8", **settings: float) -> PanelCommands:
+    path.write_text(text, encoding=encoding)
+    return PanelCommands(ValveMap(valves={"elbow": "Levers.Boom"}, map=path, **settings))
+
+
+UNSIGNED = LEVERS.replace("16@1-", "16@1+").replace("[-100|100]", "[0|100]")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_lever_that_rests_in_the_middle_of_its_range_asks_for_nothing_there(
+    tmp_path: Path, seed: int
+) -> None:
+    drawn = random.Random(seed)
+    neutral, full = drawn.uniform(10.0, 90.0), 100.0
+    commands = levers(tmp_path / "uni.dbc", UNSIGNED, neutral=neutral, full=full)
+    for _ in range(200):
+        raw = drawn.randrange(0, 1001)
+        share = (raw / 10 - neutral) / (full - neutral)
+        before = commands.refused
+        data = raw.to_bytes(2, "little") + bytes(2)
+        commands.take(can.Message(arbitration_id=256, is_extended_id=False, data=data), 0.0)
+        if abs(share) <= 1.0:
+            assert commands.signals(0.0)[0] == [pytest.approx(250 * share, abs=0.5 + 1e-9)]
+        assert commands.refused - before == (abs(share) > 1.0)
+
+
+@pytest.mark.parametrize("given", [{}, {"neutral": 0.0}, {"neutral": 100.0, "full": 200.0}])
+def test_a_signal_on_one_side_of_rest_is_refused_with_both_keys(
+    tmp_path: Path, given: dict[str, float]
+) -> None:
+    rest = given.get("neutral", 0)
+    with pytest.raises(ProtocolError) as told:
+        levers(tmp_path / "uni.dbc", UNSIGNED, **given)
+    assert str(told.value) == (
+        f"Levers.Boom is 0 to 100 in {tmp_path / 'uni.dbc'}, never on both sides of neutral, which "
+        f"is {rest:g}; give the value of the lever at rest, as in neutral: 50, and its value at "
+        "full flow, full: 100"
+    )
+
+
+def test_a_check_refuses_a_lever_that_asks_for_half_flow_at_rest(panel: Path) -> None:
+    panel.write_text(UNSIGNED, encoding="utf-8")
+    shutil.copytree(PROTOCOLS / "retrieval", panel.parent, dirs_exist_ok=True)
+    path = panel.parent / "protocol.yaml"
+    text = path.read_text(encoding="utf-8")
+    valves = "{base: Levers.Boom, arm: Levers.Arm}, map: panel.dbc"
+    path.write_text(text.replace("{base: 1, arm: 2, boom: 3, jaws: 4}", valves), encoding="utf-8")
+    with pytest.raises(ProtocolError, match=r"Levers.Boom is 0 to 100 in .*, as in neutral: 50"):
+        load(path, discover())
+
+
+def test_full_flow_is_above_rest() -> None:
+    with pytest.raises(ValueError, match="full is 100 and neutral 100; full flow is a greater"):
+        ValveMap(valves={"elbow": 1}, neutral=100.0)
+
+
+@pytest.mark.parametrize(
+    ("full", "asked"),
+    [
+        (100.0, None),
+        (50.0, "goes from -100 to 100: what is beyond -50 to 50 is refused"),
+        (250.0, "goes from -100 to 100, so that the valve is never fully open"),
+    ],
+)
+def test_a_full_flow_that_the_lever_misses_is_asked_about(
+    panel: Path, full: float, asked: str | None
+) -> None:
+    settings = ValveMap(valves={"elbow": "Levers.Boom"}, map=panel, full=full)
+    found = settings.doubts(ch8())
+    assert found == ({} if asked is None else {"full": f"is {full:g}, and Levers.Boom {asked}"})
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1250", "gb18030", "cp1252"])
+def test_comments_may_be_in_any_language(tmp_path: Path, encoding: str) -> None:
+    comment = {"gb18030": "起重机", "cp1252": "Drehsäule"}.get(encoding, "Łyżka ťž")
+    text = LEVERS + f'CM_ SG_ 256 Boom "{comment}";\n'
+    commands = levers(tmp_path / "panel.dbc", text, encoding)
+    data = (500).to_bytes(2, "little") + bytes(2)
+    commands.take(can.Message(arbitration_id=256, is_extended_id=False, data=data), 0.0)
+    assert commands.signals(0.0)[0] == [125.0]
+
+
+OVERLAP = (
+    'BO_ 512 Other: 8 P\n SG_ A : 0|8@1- (1,0) [-100|100] "" P\n'
+    ' SG_ B : 4|8@1- (1,0) [-100|100] "" P\n'
+)
+
+
+def test_signals_that_overlap_are_refused_where_they_are_used_and_nowhere_else(
+    tmp_path: Path,
+) -> None:
+    text = LEVERS + "\n" + OVERLAP
+    assert levers(tmp_path / "panel.dbc", text).asked
+    with pytest.raises(ProtocolError, match=r"cannot be used for joint 'elbow': .*overlapping"):
+        PanelCommands(ValveMap(valves={"elbow": "Other.A"}, map=tmp_path / "panel.dbc"))
+
+
+def test_an_extended_frame_is_another_than_the_standard_one_of_its_number(panel: Path) -> None:
+    commands = PanelCommands(ValveMap(valves={"elbow": "Levers.Boom"}, map=panel))
+    data = (500).to_bytes(2, "little") + bytes(2)
+    commands.take(can.Message(arbitration_id=256, is_extended_id=True, data=data), 0.0)
+    assert commands.signals(0.0) == ([0.0], [False], False)
+    assert commands.complaint() == (
+        "1 frame was not for these valves, the last extended 0x00000100"
+    )
+
+
+J1939 = LEVERS.replace("BO_ 256 Levers: 4 P", f"BO_ {0x8CFDD6FE} Levers: 8 P")
+
+
+def test_a_j1939_panel_has_any_source_and_priority(tmp_path: Path) -> None:
+    drawn = random.Random(3)
+    text = J1939
+    data = (500).to_bytes(2, "little") + bytes(6)
+    for _ in range(50):
+        node, priority = drawn.randrange(254), drawn.randrange(8)
+        identifier = priority << 26 | 0xFDD6 << 8 | node
+        commands = levers(tmp_path / "j1939.dbc", text)
+        commands.take(can.Message(arbitration_id=identifier, data=data), 0.0)
+        assert commands.signals(0.0)[0] == [125.0]
+        commands = levers(tmp_path / "j1939.dbc", text)
+        commands.take(can.Message(arbitration_id=identifier + 0x100, data=data), 0.0)
+        assert not commands.signals(0.0)[2]
+        assert f"the last extended 0x{identifier + 0x100:08X}" in commands.complaint()
+    commands = levers(tmp_path / "j1939.dbc", text, node=0x27)
+    commands.take(can.Message(arbitration_id=0x0CFDD628, data=data), 0.0)
+    assert not commands.signals(0.0)[2]
+    commands.take(can.Message(arbitration_id=0x0CFDD627, data=data), 0.0)
+    assert commands.signals(0.0)[2]
 
 
 BRIDGE = ("gateway", "can", "--bus", "virtual:by-name", "--seconds", "0.01")
