@@ -202,6 +202,12 @@ def _includable(word: str) -> Status:
 
 
 def _nobody(folder: Path, left_out: Sequence[Participant]) -> str:
+    if not left_out and (path := participant_path(folder)).exists():
+        return (
+            f"{folder} is not a study's data folder but holds one recording, {path.name}; give the "
+            "folder above it, or read what was recorded without a study with "
+            "labcrane.open_recording, or its ses-*_streams.xdf with any reader of XDF"
+        )
     if not left_out:
         return f"there is no participant in {folder}; give the folder that holds P001/P001.h5"
     counts = {str(s): sum(p.status is s for p in left_out) for s in Status}

@@ -17,15 +17,28 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from labcrane.errors import RecordingError
 from labcrane.files.atomic import PRIVATE_FILE, PRIVATE_FOLDER
 from labcrane.recording.data_folder import DataFolder
 
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """The folders of one study's data."""
+    """The folders of one study's data.
+
+    Raises
+    ------
+    RecordingError
+        ``root`` is a file.
+    """
 
     root: Path
+
+    def __post_init__(self) -> None:
+        if self.root.is_file():
+            raise RecordingError(
+                f"{self.root} is a file; give the folder that holds the study's data"
+            )
 
     @property
     def register(self) -> Path:

@@ -7,6 +7,7 @@ import pytest
 
 from labcrane import ProtocolError, RecordingError
 from labcrane.analysis.cohort import Cohort, Status, find_cohort
+from labcrane.cli.app import main
 
 
 def test_only_complete_participants_are_included(cohort: Cohort) -> None:
@@ -54,6 +55,35 @@ def test_a_folder_without_anybody_to_use_says_what_is_in_it(tmp_path: Path) -> N
     erased = {"P001": (Status.ERASED, "on 2026-05-01: withdrew")}
     with pytest.raises(RecordingError, match=r"can be used as asked: 1 erased$"):
         find_cohort(tmp_path, struck=erased)
+
+
+def test_the_folder_of_one_recording_is_told_from_a_study(data: Path) -> None:
+    with pytest.raises(RecordingError) as told:
+        find_cohort(data / "P001")
+    assert str(told.value) == (
+        f"{data / 'P001'} is not a study's data folder but holds one recording, P001.h5; give the "
+        "folder above it, or read what was recorded without a study with labcrane.open_recording, "
+        "or its ses-*_streams.xdf with any reader of XDF"
+    )
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("report", "{}"), ("score", "{}"), ("export", "{}", "--to", "tables", "--out", "new"),
+        ("participants", "--data", "{}"), ("where", "P001", "--data", "{}"),
+        ("transfer", "store", "--data", "{}"),
+        ("erase", "P001", "--reason", "left", "--data", "{}"),
+        ("exclude", "P001", "--reason", "left", "--data", "{}"),
+    ],
+)  # fmt: skip
+def test_a_file_given_as_data_folder_is_refused(
+    data: Path, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = data / "P001" / "P001.h5"
+    assert main([word.format(path) for word in words]) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    assert said == f"labcrane: {path} is a file; give the folder that holds the study's data"
 
 
 def test_nobody_to_use_names_what_would_help(data: Path, tmp_path: Path) -> None:
