@@ -235,6 +235,7 @@ def recorded(component: Component | None) -> Iterator[str]:
         return
     groups = {"Records": component.signals}
     if isinstance(component, Task):
+        groups["What is varied in trials"] = component.conditions
         groups["A trial is measured by"] = component.results
     if isinstance(component, Feedback):
         groups |= {f"Stream `{name}`": signals for name, signals in component.streams.items()}

@@ -8,7 +8,9 @@ from labcrane.analysis.gaze import FIXATIONS, gaze_units
 from labcrane.analysis.presented import PRESENTED
 from labcrane.analysis.questionnaires import ANSWERS, MEANING, SCORES, asked_in, score_column
 from labcrane.analysis.tables.definitions import MEASURES
+from labcrane.recording.frame_log import LOOP
 from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.recording.trial_columns import OWN
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,7 +67,8 @@ def trial_codebook(
     asked = _asked(sessions)
 
     units = session.context.get("trial_units", {})
-    definitions = session.context.get("trial_definitions", {})
+    own = {each.name: each.definition for each in OWN}  # of a file that does not define them
+    definitions = own | session.context.get("trial_definitions", {})
     computed = {**MEASURES, **PRESENTED, **gaze_units(measures.columns)}
     rows = []
     for column in map(str, measures.columns):
@@ -146,12 +149,12 @@ def stream_codebook(session: SessionRecord) -> "pd.DataFrame":
     """Return the same of a session's streams; the table is the stream."""
     import pandas as pd
 
-    rows = []
+    rows, told = [], {f"loop.{each.name}": each.definition for each in LOOP}
     for name, stream in session.streams.items():
         source = "another program's stream" if "corrected" in stream.attrs else WRITTEN
         rows.append((name, "time", "s", "time on the session's clock", source))
         rows += [
-            (name, column, unit, column.replace(".", " "), source)
+            (name, column, unit, told.get(f"{name}.{column}") or column.replace(".", " "), source)
             for column, unit in stream.units.items()
         ]
     return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])

@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 from labcrane.core.records import Value
-from labcrane.core.signals import Layout
+from labcrane.core.signals import Layout, Signal
 from labcrane.design.plan import plan_session
 from labcrane.files.pseudonyms import pseudonyms
 from labcrane.protocol.design import CONDITION
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.frame_log import LOOP
-from labcrane.recording.trial_columns import OWN, UNITS, trial_units
+from labcrane.recording.trial_columns import OWN, trial_definitions, trial_units
 
 CORE = "labcrane"
 ABOUT = (
@@ -21,9 +21,6 @@ ABOUT = (
     "feedback", "outcome", "completion", "track_success",
 )  # fmt: skip
 """Columns of the trial table that are labcrane's own, besides those with units."""
-
-FLAGS = ("practice", "reference", "track_success")
-"""Truth values, recorded as 1 or 0."""
 
 EVENTS = (("time", "s"), ("tick", "1"), ("part", "1"), ("trial", "1"), ("name", ""), ("data", ""))
 
@@ -43,7 +40,7 @@ class CodebookColumn:
     source
         Who makes it: labcrane, or a plugin and what it offers.
     definition
-        What it is, where it is a result of a task or of every trial.
+        What it is, in words, where its name does not say it.
     """
 
     table: str
@@ -58,7 +55,7 @@ def codebook(study: Study) -> list[CodebookColumn]:
     parts = Rig.build(study, simulated=False)
     tasks = {choice.name: choice for choice in study.task_choices.values()}
     task_source = ", ".join(f"{choice.plugin}: {choice.name}" for choice in tasks.values())
-    found = [CodebookColumn("loop", name, unit, CORE) for name, unit in LOOP]
+    found = [CodebookColumn("loop", each.name, each.unit, CORE, each.definition) for each in LOOP]
     for table, component, source in (
         ("input", parts.input, f"{study.input.plugin}: {study.input.name}"),
         ("command", parts.controller, f"{study.scheme.plugin}: {study.scheme.name}"),
@@ -74,18 +71,19 @@ def codebook(study: Study) -> list[CodebookColumn]:
 
 def _trials(study: Study) -> list[CodebookColumn]:
     found: dict[str, CodebookColumn] = {}
-    about = [name for name in ABOUT if _has(study, name)]
-    units = {**UNITS, **{name: "1" for name in FLAGS if name in about}}
-    defined = {signal.name: signal.definition for signal in OWN}
-    for name in (*about, *units):
-        unit = units.get(name, "")
-        found[name] = CodebookColumn("trials", name, unit, CORE, defined.get(name, ""))
+    own = {signal.name: signal for signal in OWN}
+    for name in (*ABOUT, *own):
+        if _has(study, name):
+            known = own.get(name, Signal(name, ""))
+            found[name] = CodebookColumn("trials", name, known.unit, CORE, known.definition)
     for name, (task, values) in _conditions(study).items():
         if name in found:
             continue  # labcrane's own, as the condition within participants
         choice = study.task_choices[task]
+        source = f"{choice.plugin}: {choice.name}"
         unit = trial_units(study.tasks[task]).get(name, "" if _is_text(values) else "1")
-        found[name] = CodebookColumn("trials", name, unit, f"{choice.plugin}: {choice.name}")
+        defined = trial_definitions(study.tasks[task]).get(name, "")
+        found[name] = CodebookColumn("trials", name, unit, source, defined)
     for task, choice in study.task_choices.items():
         for signal in study.tasks[task].results:
             for name in signal.columns:
@@ -102,7 +100,10 @@ def _has(study: Study, name: str) -> bool:
         "group": bool(protocol.design.groups),
         CONDITION: any(step.block is not None and step.block.condition for step in steps),
         "feedback": bool(protocol.feedback),
-        "track_success": any(step.block is not None and step.block.track for step in steps),
+        **dict.fromkeys(
+            ("track", "track_level", "track_success"),
+            any(step.block is not None and step.block.track for step in steps),
+        ),
         "reference": any(step.kind == "reference" for step in steps),
     }
     return given.get(name, True)

@@ -148,8 +148,9 @@ class Task(Component):
 
     Codebook, participant file, report and reference take the definitions from here."""
 
-    condition_units: Mapping[str, str] = {}
-    """Units of the numbers in its trials' conditions; ``"1"`` for counts and ratios."""
+    conditions: tuple[Signal, ...] = ()
+    """What is varied in its trials, with units and definitions: the keys of their conditions, which
+    are columns of the trial table. The unit of a count or ratio is ``"1"``, of words ``""``."""
 
     reports: tuple[str, ...] = ()
     """What people may say by a button of either page that they have seen, while a trial of it runs:

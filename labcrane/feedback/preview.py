@@ -98,7 +98,7 @@ def movement(record: SessionRecord, trial: int | None = None) -> list[Frame]:
         there = ", ".join(str(int(number)) for number in counted.unique()) or "none"
         raise ProtocolError(f"there is no trial {trial} in the recording; there is {there}")
     arrays = [parts[name].to_numpy() for name in ("input", "command", "state", "task")]
-    head = loop[[label for label, _ in LOOP]].to_numpy()
+    head = loop[[each.name for each in LOOP]].to_numpy()
     frame = FrameRow(array.shape[1] for array in arrays).frame
     return [frame(row) for row in np.column_stack([head, *arrays])[rows]]
 

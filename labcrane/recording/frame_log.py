@@ -10,6 +10,7 @@ import numpy as np
 
 from labcrane.core.clock import Tick
 from labcrane.core.records import Event, Frame, Phase, Run
+from labcrane.core.signals import Signal
 from labcrane.errors import RecordingError
 from labcrane.limits import LIMITS
 from labcrane.recording.journal import Column, SessionJournal
@@ -20,15 +21,20 @@ PHASES = tuple(Phase)
 CODES: Mapping[Phase, float] = {phase: float(code) for code, phase in enumerate(PHASES)}
 
 LOOP = (
-    ("tick", "1"),
-    ("due", "s"),
-    ("woke", "s"),
-    ("wrote", "s"),  # how long writing the frame before took
-    ("trial", "1"),
-    ("elapsed", "s"),
-    ("phase", "1"),
-    ("paused", "1"),
+    Signal("tick", "1", definition="number of the tick, from 0"),
+    Signal("due", "s", definition="when the tick was to begin, on the session's clock"),
+    Signal("woke", "s", definition="when the tick began, on the session's clock"),
+    Signal("wrote", "s", definition="how long it took to write the frame before"),
+    Signal("trial", "1", definition="number of the trial under way; 0 between trials"),
+    Signal("elapsed", "s", definition="time since the trial's start, without pauses"),
+    Signal(
+        "phase",
+        "1",
+        definition=", ".join(f"{code} {phase}" for code, phase in enumerate(PHASES)),
+    ),
+    Signal("paused", "1", definition="1 while the session is paused, else 0"),
 )
+"""What the loop itself puts into every row."""
 
 DUE = 1
 """Which of them says when a tick is due."""
@@ -38,7 +44,7 @@ def columns(run: Run) -> tuple[Column, ...]:
     """Return what a row holds, in order."""
     layouts = {"input": run.axes, "command": run.command, "state": run.state, "task": run.task}
     return (
-        *(Column("loop", label, unit) for label, unit in LOOP),
+        *(Column("loop", each.name, each.unit) for each in LOOP),
         *(
             Column(group, label, unit)
             for group, layout in layouts.items()

@@ -55,7 +55,7 @@ class RecordedFrames:
         if not self._first <= row < self._first + len(self._rows):
             parts = [self._streams[name].rows(row, row + WINDOW) for name in self._streams]
             head, others = parts[0], parts[1:]
-            columns = [head[label] for label, _ in LOOP]
+            columns = [head[each.name] for each in LOOP]
             columns += [values for part in others for values in part.values()]
             self._first, self._rows = row, np.column_stack(columns)
         frame: Frame = self._frame(self._rows[row - self._first])

@@ -1,7 +1,10 @@
 """Columns of the trial table, their units and their definitions."""
 
+from labcrane.core.records import Phase
 from labcrane.core.roles import Task
 from labcrane.core.signals import Signal
+
+ENDS = tuple(str(phase) for phase in Phase if phase.over)
 
 OWN = (
     Signal("started", "s", definition="when the trial began, on the session's clock"),
@@ -13,6 +16,25 @@ OWN = (
     Signal("trial", "1", definition="number of the trial in the session, from 1"),
     Signal("attempt", "1", definition="number of the attempt at the trial, from 1"),
     Signal("block", "1", definition="number of the block in the session, from 1"),
+    Signal("block_name", "", definition="the protocol's name of the block, or else its task's"),
+    Signal(
+        "practice",
+        "1",
+        definition="1 where the block was practice, which is in no average, else 0",
+    ),
+    Signal("group", "", definition="the participant's group of the design"),
+    Signal("condition", "", definition="the condition within participants of the design"),
+    Signal("track", "", definition="the adaptive track that chose the trial's level"),
+    Signal("track_level", "", definition="the level that it chose"),
+    Signal("reference", "1", definition="1 where the trial sets the indicator's reference, else 0"),
+    Signal("feedback", "", definition="what was switched on in the trial, joined by +; or none"),
+    Signal(
+        "track_success",
+        "1",
+        definition="1 where the trial was a success for its adaptive track, 0 where not; NaN where "
+        "it was neither",
+    ),
+    Signal("outcome", "", definition=f"how the trial ended: {', '.join(ENDS)}"),
     Signal(
         "completion",
         "1",
@@ -20,22 +42,24 @@ OWN = (
         "none was set",
     ),
 )
-"""Columns that every trial table has."""
-
-UNITS = {signal.name: signal.unit for signal in OWN}
+"""Columns that a session may put into its trial table."""
 
 
 def trial_units(task: Task) -> dict[str, str]:
     """Return the unit of every numeric column that ``task`` and the session put into a row."""
-    results = {column: signal.unit for signal in task.results for column in signal.columns}
-    return {**UNITS, **dict(task.condition_units), **results}
+    return {
+        column: signal.unit
+        for signal in (*OWN, *task.conditions, *task.results)
+        for column in signal.columns
+        if signal.unit
+    }
 
 
 def trial_definitions(task: Task) -> dict[str, str]:
-    """Return what is in each column of the session and of the results of ``task``."""
+    """Return what is in each column of the session and of ``task``."""
     return {
         column: signal.definition
-        for signal in (*OWN, *task.results)
+        for signal in (*OWN, *task.conditions, *task.results)
         for column in signal.columns
         if signal.definition
     }

@@ -155,7 +155,7 @@ def _recorded(
         return None
     found = [(ROLES[role].recorded, signal) for signal in component.signals]
     if isinstance(component, Task):
-        found += [("every trial", signal) for signal in component.results]
+        found += [("every trial", signal) for signal in (*component.conditions, *component.results)]
     columns = [
         Recorded(column, signal.unit, where, signal.definition)
         for where, signal in found

@@ -110,12 +110,30 @@ class Aiming(Task):
         Signal("peak_speed", "m/s", definition="largest speed of the tip in the trial"),
     )
 
-    condition_units = {  # noqa: RUF012 - a constant of the class, as its signals are
-        **dict.fromkeys(("distance", "width", "start_x", "start_y", "start_z"), "m"),
-        **dict.fromkeys(("target_x", "target_y", "target_z"), "m"),
-        "difficulty": "bit",
-        "movement": "1",
-    }
+    conditions = (
+        Signal("pair", "", definition="the pair of circles, by distance and place of the far one"),
+        Signal("distance", "m", definition="from the centre of one circle to that of the other"),
+        Signal("width", "m", definition="diameter of the circles"),
+        Signal(
+            "difficulty",
+            "bit",
+            definition="index of difficulty, log2(distance / width + 1) (ISO 9241-411)",
+        ),
+        Signal("far_side", "", definition="side of the far circle, seen from the machine"),
+        Signal(
+            "movement",
+            "1",
+            definition="number of the movement of the pair, from 1; 0 goes to its first circle",
+        ),
+        Signal(
+            "direction", "", definition="outward: to the far circle; inward: back to the near one"
+        ),
+        *(
+            Signal(f"{which}_{axis}", "m", definition=f"centre of the {circle}, {axis}")
+            for which, circle in (("start", "circle that is left"), ("target", "target circle"))
+            for axis in "xyz"
+        ),
+    )
 
     def __init__(self, settings: AimingSettings, machine: Machine) -> None:
         self._settings = settings

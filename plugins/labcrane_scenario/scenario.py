@@ -39,6 +39,8 @@ class Scenario(Task):
         Signal("mistakes", "1", tuple(KINDS)),
     )
 
+    conditions = (Signal("scenario", "", definition="the scene, by the name of its file"),)
+
     results = (
         Signal("time", "s", definition="from the trial's start to its end"),
         Signal("goals", "1", definition="goals that were reached"),

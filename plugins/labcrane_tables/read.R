@@ -2,6 +2,7 @@
 #
 #   source("read.R"); study <- read_labcrane(".")
 #   study$trials                          one row per movement
+#   study$questionnaires, study$scores    one row per answer, per score
 #   study$streams[["NAME_ses-01_frames"]] one row per tick
 #   study$codebook                        unit, meaning and source of every column
 #
@@ -12,9 +13,8 @@ read_labcrane <- function(folder = ".") {
   table <- function(name) {
     read.csv(file.path(folder, name), na.strings = "", encoding = "UTF-8", check.names = FALSE)
   }
-  study <- lapply(
-    c(participants = "participants.csv", trials = "trials.csv", events = "events.csv",
-      codebook = "codebook.csv"), table)
+  names <- sub("\\.csv$", "", list.files(folder, "\\.csv$"))
+  study <- sapply(names, function(name) table(paste0(name, ".csv")), simplify = FALSE)
   study$streams <- read_streams(file.path(folder, "streams"))
   study
 }

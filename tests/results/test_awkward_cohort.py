@@ -66,7 +66,7 @@ def test_a_result_has_one_definition_wherever_it_is_read(
     awkward: Awkward, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     task = awkward.lab.study.tasks["aiming"]
-    defined = {signal.name: signal.definition for signal in task.results}
+    defined = {signal.name: signal.definition for signal in (*task.conditions, *task.results)}
     assert "movement time of Dreger et al." in defined["circle_to_circle"]
     book = pd.read_csv(awkward.export("tables") / "codebook.csv").query("table == 'trials'")
     told = book.set_index("column")["description"].to_dict()

@@ -65,6 +65,12 @@ def test_the_codebook_has_every_column_and_the_units_of_the_file(folder: Path) -
     assert book.loc[("trials", "difficulty"), "unit"] == "bit"
     assert book.loc[("frames", "state_tip_velocity_x"), "unit"] == "m/s"
     assert book["description"].notna().all()
+    # Of trials, events and the loop every column says more than its name.
+    named = book[book["description"] == book.index.get_level_values("column").str.replace("_", " ")]
+    assert not set(named.index.get_level_values("table")) & {"trials", "events"}
+    assert not [column for _, column in named.index if column.startswith("loop_")]
+    assert book.loc[("frames", "loop_phase"), "description"].startswith("0 idle, 1 running, 2 succ")
+    assert book.loc[("trials", "outcome"), "description"].startswith("how the trial ended: success")
 
 
 READ = """
@@ -89,7 +95,7 @@ def test_read_r_says_which_streams_it_cannot_read_and_loads_the_rest(
         'requireNamespace <- function(...) FALSE; options(warn = 1); sink(stderr(), type = "m")'
     )
     said = table(r(f"{hidden}\n{READ.replace('1000', '1')}", tmp_path))
-    assert said["tables"][0] == "participants trials events codebook streams"
+    assert said["tables"][0] == "codebook events participants questionnaires scores trials streams"
     assert len(said["time"]) == len(measures_of(cohort.included[0]))
 
 
@@ -97,7 +103,10 @@ def test_read_r_says_which_streams_it_cannot_read_and_loads_the_rest(
 @needs_r
 def test_read_r_loads_everything_in_one_call(folder: Path, cohort: Cohort) -> None:
     said = table(r(READ, folder))
-    assert said["tables"][0] == "participants trials events codebook streams"
+    assert set(said["tables"][0].split()) == {path.stem for path in folder.glob("*.csv")} | {
+        "streams"
+    }
+    assert {"questionnaires", "scores"} <= set(said["tables"][0].split())
     assert said["streams"][0] == (
         "P001_ses-01_eyes P001_ses-01_frames P002_ses-01_eyes P002_ses-01_frames"
     )

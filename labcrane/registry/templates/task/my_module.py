@@ -32,7 +32,8 @@ class MyPart(Task):
     signals = (Signal("target.position", "m", ("x", "y", "z")), Signal("target.radius", "m"))
     # What a finished trial is measured by.
     results = (Signal("duration", "s", definition="from the start of the trial to its end"),)
-    condition_units = {"height": "m"}  # noqa: RUF012 - a constant of the class, as signals are
+    # What is varied in trials.
+    conditions = (Signal("height", "m", definition="height of the target above the ground"),)
 
     def __init__(self, settings: MyPartSettings) -> None:
         self._settings = settings
