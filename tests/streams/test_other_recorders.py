@@ -83,3 +83,20 @@ def test_markers_that_go_back_by_less_than_their_clock_may_be_of_either_side() -
     corrected = correct(raw, drawn.treatment)
     assert np.mean(np.abs(corrected.time - drawn.truth) <= corrected.error) >= 0.99
     assert corrected.quality.steps == 1
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_stamps_that_go_back_by_whole_periods_state_it(seed: int) -> None:
+    """They equal earlier ones, and were taken for samples sent again: 0.1 ms, and 800 ms off."""
+    random = np.random.default_rng(seed)
+    period = float(random.choice([0.001, 0.002, 0.004, 0.01]))
+    times = 1000.0 + np.arange(int(60.0 / period)) * period
+    back = int(random.uniform(0.6, 5.0) / period)
+    at = int(random.uniform(0.2, 0.8) * len(times))
+    stamps = np.where(np.arange(len(times)) < at, times, np.roll(times, back))
+    told = np.arange(1000.0, 1060.0, 5.0)
+    shown = np.column_stack([told, np.zeros(len(told)), np.full(len(told), 1e-3), told])
+    corrected = correct(RawStream.of(stamps, shown), Treatment(1.0 / period))
+    assert np.mean(np.abs(corrected.time - times) <= corrected.error) >= 0.99
+    assert corrected.quality.repeated == 0
+    assert corrected.quality.rate_hz == pytest.approx(1.0 / period, rel=1e-3)

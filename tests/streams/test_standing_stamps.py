@@ -8,6 +8,8 @@ from streams.unkind import START, Clock, received, regular
 
 from labcrane.streams.sync.correction import correct
 from labcrane.streams.sync.quality import Basis
+from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.report.certificate import Fault, faults
 
 STANDING = {
     "all equal": lambda stamps: np.full(len(stamps), stamps[0]),
@@ -64,3 +66,24 @@ def test_few_samples_of_one_stamp_end_no_correction(count: int, rate: float) -> 
     drawn = drawn_of(np.random.default_rng(2), rate)
     raw = replace(drawn.raw, stamps=np.full(count, drawn.raw.stamps[0]))
     assert len(correct(raw, drawn.treatment).time) == count
+
+
+@pytest.mark.parametrize("arrivals", [True, False])
+@pytest.mark.parametrize("share", [0.01, 0.15, 0.3, 0.45, 0.65])
+def test_stamps_that_stand_for_any_part_of_a_recording_are_named_and_stated(
+    share: float, *, arrivals: bool
+) -> None:
+    """From 200 samples on they were taken for samples sent again: 10 s off, 0.2 ms stated."""
+    random = np.random.default_rng([int(100 * share), arrivals])
+    drawn = drawn_of(random, 250.0)
+    count = len(drawn.raw.stamps)
+    begin = int(random.uniform(0.05, 0.9 - share) * count)
+    stamps = drawn.raw.stamps.copy()
+    stamps[begin : begin + int(share * count)] = stamps[begin]
+    raw = replace(drawn.raw, stamps=stamps)
+    if not arrivals:
+        raw = RawStream.of(stamps, raw.probes)
+    corrected = correct(raw, drawn.treatment)
+    assert np.mean(np.abs(corrected.time - drawn.truth) <= corrected.error) >= 0.99
+    assert Fault.FROZEN in faults(corrected.quality, 250.0)
+    assert corrected.quality.repeated == 0

@@ -39,6 +39,7 @@ from labcrane.streams.sync.quality import (
 )
 from labcrane.streams.sync.raw import REMOTE, RTT, RawStream
 from labcrane.streams.sync.sampling import RATE_CHANGE, Sampling, examine, examine_irregular
+from labcrane.streams.sync.stamping.shifts import MOST_S
 from labcrane.types import FloatArray
 
 
@@ -149,7 +150,7 @@ def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> C
     if not told.all():
         return _some_untold(raw, treatment, end, told)
     of = repeats.first_of(raw.stamps, treatment.rate_hz) if treatment.rate_hz > 0.0 else None
-    if of is None:
+    if of is None or (not len(raw.arrivals) and _went_back(raw.stamps)):
         return _on_our_clock(raw, treatment, end)
     own = of == np.arange(len(of))
     found = _on_our_clock(repeats.left_out(raw, own), treatment, end)
@@ -161,6 +162,14 @@ def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> C
         repeats.put_back(found.segments, own),
         replace(found.quality, repeated=int(np.count_nonzero(~own))),
     )
+
+
+def _went_back(stamps: FloatArray) -> bool:
+    """Return whether stamps go back further than any buffer shrinks.
+
+    By whole periods, that looks like samples sent again; only arrivals tell which it is.
+    """
+    return bool((np.diff(stamps) < -MOST_S).any())
 
 
 def _some_untold(
@@ -271,7 +280,7 @@ def _evened(
     for segment, sampling, followed in sampled:
         part = slice(segment.start, segment.stop)
         # Nothing tells cut stamps from rounded ones, and so whether they are half a unit early.
-        error[part] += sampling.grid_s / 2.0 + sampling.back_s
+        error[part] += sampling.grid_s / 2.0 + sampling.back_s + sampling.kept_s
         if not len(raw.arrivals):  # nothing shows whether samples or their stamps are uneven
             error[part] += NEARLY_ALL * sampling.uneven_s
         if sampling.strayed is not None:

@@ -59,6 +59,9 @@ DRIFTED_S = 0.002
 FROZEN_SHARE = 0.2
 """Where more samples repeat a stamp, chunks have one each."""
 
+FEW_STANDS = 0.01
+"""Stands of more than this part of all stamps are chunks that share one."""
+
 LONG_STAND = 4
 """So many samples of one stamp are more than a poll hands over now and then."""
 
@@ -159,10 +162,15 @@ def _hold_frozen(stamps: FloatArray, time: FloatArray, error: FloatArray) -> tup
     And how many do so with several others.
     """
     same = np.diff(stamps) == 0.0
-    if not same.any() or same.mean() > FROZEN_SHARE:
+    if not same.any():
         return 0, 0
     starts = np.r_[0, np.flatnonzero(~same) + 1]
     stops = np.r_[starts[1:], len(stamps)]
+    counts = stops - starts
+    long = counts >= LONG_STAND
+    usual = counts if long.mean() > FEW_STANDS else counts[~long]
+    if (usual - 1).sum() > FROZEN_SHARE * usual.sum():
+        return 0, 0
     several = stops - starts > 1
     for start, stop in zip(starts[several], stops[several], strict=True):
         after = time[min(stop, len(time) - 1)] - time[start]

@@ -19,7 +19,7 @@ HALF = 0.5
 """Repeats that take less than this part of their periods were sent again."""
 
 AROUND = 200
-"""So many samples before and after show whether repeats took time: delays pass meanwhile."""
+"""So many samples before and after a run of repeats show whether they took time: delays pass."""
 
 
 def first_of(stamps: FloatArray, rate_hz: float) -> Which | None:
@@ -44,9 +44,10 @@ def first_of(stamps: FloatArray, rate_hz: float) -> Which | None:
     again = of != np.arange(len(stamps))
     if not again.any():
         return None
-    begins = np.flatnonzero(np.diff(np.r_[0, again.astype(int)]) == 1)
+    edges = np.diff(np.r_[0, again.astype(int), 0])
+    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     last = len(stamps) - 1
-    low, high = np.maximum(begins - AROUND, 0), np.minimum(begins + AROUND, last)
+    low, high = np.maximum(begins - AROUND, 0), np.minimum(ends + AROUND, last)
     repeats = np.r_[0, np.cumsum(again)]
     some = (repeats[high + 1] - repeats[low + 1]).astype(float)
     latest = np.maximum.accumulate(stamps)

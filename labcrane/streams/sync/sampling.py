@@ -101,6 +101,8 @@ class Sampling:
         none is.
     breaks
         The samples behind holes of which nothing shows how many periods they are.
+    kept_s
+        By how much stamps scatter, as arrivals show, that could not be evened.
     back_s
         By how much stamps go back, in sum, further than any buffer shrinks.
     """
@@ -126,6 +128,7 @@ class Sampling:
     strayed: FloatArray | None = None
     breaks: npt.NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     back_s: float = 0.0
+    kept_s: float = 0.0
 
     @property
     def rate_hz(self) -> float:
@@ -136,7 +139,8 @@ class Sampling:
         """Return it as steady only if evening moved samples as far as stamping noise scatters.
 
         Noise is new in each stamp, so that a few neighbours show all of it. What adds up beyond
-        that is the sampler's own, as of a camera that takes longer in the dark.
+        that is the sampler's own, as of a camera that takes longer in the dark. What arrivals show
+        to be noise stays noise, as far as neighbours show it, though nothing takes it away.
 
         Parameters
         ----------
@@ -149,7 +153,10 @@ class Sampling:
         allowed = WITHIN * self.grid_s if by_grid else self.reach_s
         if float(np.quantile(np.abs(moved), 0.95)) <= allowed:
             return self
-        return replace(self, noise_s=0.0, late_stamps=False, steady=False, uncounted=False)
+        kept = 0.0 if self.late_stamps else min(self.noise_s, self.reach_s)
+        return replace(
+            self, noise_s=0.0, kept_s=kept, late_stamps=False, steady=False, uncounted=False
+        )
 
 
 def examine(
@@ -399,6 +406,8 @@ def _rates(found: _Steps) -> tuple[float, ...]:
     span = np.diff(found.index[edges])
     if len(span) < PIECES or (span <= 0).any() or (found.computed and found.balance >= DELAYS):
         return ()
+    if not (np.diff(found.flowed[edges]) > 0.0).all():  # stamps stood still, or went back
+        return ()
     rate = np.diff(found.flowed[edges]) / span
     scatter = 1.4826 * float(np.median(np.abs(np.diff(rate)))) / np.sqrt(2.0)
     ends = [float(np.median(part)) for part in (rate[:4], rate[-4:])]
@@ -486,7 +495,7 @@ def coarse_unit(stamps: FloatArray, *, regular: bool) -> float:
     if not regular or len(stamps) < 2:  # noqa: PLR2004
         return units.tick(stamps, unit, 0.0)
     period = _typical(np.sort(stamps), np.arange(float(len(stamps))))
-    if abs(unit / period - 1.0) < RATE_CHANGE:  # all steps are of one sample, or of some
+    if abs(unit - period) < RATE_CHANGE * period:  # all steps are of one sample, or of some
         return 0.0
     return units.tick(stamps, unit, period)
 
