@@ -78,7 +78,8 @@ def correct(
     Raises
     ------
     RecordingError
-        An array has another shape, or holds what is no number.
+        An array has another shape, or holds what is no number; so does a number, or a rate or a
+        round trip is negative.
 
     Notes
     -----
@@ -99,6 +100,10 @@ def correct(
     """
     if evening not in EVENING:
         raise RecordingError(f"evening is {evening!r}; it may be {', '.join(EVENING)}")
+    _known("rate_hz", rate_hz, least=0.0)
+    _known("latency_s", latency_s)
+    if end is not None:
+        _known("end", end)
     taken = _column("stamps", stamps)
     count = len(taken)
     shown = np.empty((0, 4))
@@ -108,6 +113,11 @@ def correct(
             raise RecordingError(
                 f"probes must be finite numbers of the shape (n, 3), {', '.join(PROBE)}; they have "
                 f"the shape {table.shape}"
+            )
+        if (table[:, 2] < 0.0).any():
+            raise RecordingError(
+                f"round trips, the third column of probes, are {table[:, 2].min():.6g} s at least; "
+                "none is negative"
             )
         table = table[np.argsort(table[:, 0] + table[:, 1], kind="stable")]
         shown = np.column_stack([table, table[:, 0] + table[:, 1]])
@@ -126,6 +136,12 @@ def correct(
             )
     treatment = Treatment(rate_hz=rate_hz, latency_s=latency_s, dejitter=EVENING[evening])
     return correct_raw(RawStream.of(taken, shown, came, index=index, own=own), treatment, end)
+
+
+def _known(name: str, value: float, least: float = -np.inf) -> None:
+    if not np.isfinite(value) or value < least:
+        wanted = "a finite number" if least < 0.0 else "a finite number and not negative"
+        raise RecordingError(f"{name} is {value}; it must be {wanted}")
 
 
 def _column(name: str, values: npt.ArrayLike, count: int | None = None) -> npt.NDArray[np.float64]:

@@ -53,6 +53,14 @@ def test_a_lag_that_may_be_a_clock_behind_is_in_the_uncertainty(
         ({"arrivals": np.zeros(4)}, r"arrivals must have the shape \(3,\), one per stamp"),
         ({"counter": [0.0, np.nan, 2.0]}, "counter hold what is no number"),
         ({"probes": np.zeros((5, 4))}, "remote time, offset, round trip; they have the shape"),
+        (
+            {"probes": [[0.0, 0.0, 1e-3], [1.0, 0.0, -1e-3]]},
+            "are -0.001 s at least; none is negative",
+        ),
+        ({"rate_hz": np.nan}, "rate_hz is nan; it must be a finite number and not negative"),
+        ({"rate_hz": -3.0}, "rate_hz is -3.0; it must be a finite number and not negative"),
+        ({"latency_s": np.nan}, "latency_s is nan; it must be a finite number"),
+        ({"end": np.inf}, "end is inf; it must be a finite number"),
         ({"evening": "maybe"}, "evening is 'maybe'; it may be auto, forbid, force"),
     ],
 )
