@@ -95,7 +95,7 @@ def test_an_export_on_another_disk_is_reached_later(lab: Lab, tmp_path: Path) ->
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("step", [KILLS[0], pytest.param(2, marks=pytest.mark.long), 11])
+@pytest.mark.parametrize("step", [KILLS[0], pytest.param(2, marks=pytest.mark.long), 23])
 def test_an_erasure_that_is_killed_anywhere_is_finished_by_the_next_call(
     recorded: Lab, tmp_path: Path, step: int
 ) -> None:

@@ -41,7 +41,7 @@ def relabel(lab: Lab) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("step", [KILLS[0], 11])
+@pytest.mark.parametrize("step", [KILLS[0], 23])
 def test_a_relabelling_that_is_killed_anywhere_is_finished_by_the_next_call(
     recorded: Lab, tmp_path: Path, step: int
 ) -> None:

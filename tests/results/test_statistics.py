@@ -127,7 +127,7 @@ def epsilon(values: np.ndarray) -> float:
 @pytest.mark.slow
 def test_epsilon_is_1_under_sphericity_and_least_for_one_varying_level() -> None:
     rng = np.random.default_rng(8)
-    assert epsilon(rng.standard_normal((20_000, 4))) == pytest.approx(1.0, abs=2e-3)
+    assert epsilon(rng.standard_normal((2_000, 4))) == pytest.approx(1.0, abs=5e-3)
     one_line = rng.standard_normal((50, 1)) * np.array([[0.0, 1.0, 2.0, 3.0]])
     assert epsilon(one_line) == pytest.approx(1.0 / 3.0)
 
