@@ -43,7 +43,7 @@ HEAD = (
     "|---|---|---|---|---|---|",
 )
 SHORT = ("--seconds", "120", "--restarts", "2", "--draws", "2")
-INSTANT = ("--seconds", "5", "--restarts", "1", "--draws", "1")
+INSTANT = ("--seconds", "10", "--restarts", "1", "--draws", "1")
 
 
 @dataclass(frozen=True)
