@@ -415,13 +415,16 @@ HINGED = """\
 <mujoco><compiler angle="radian"/><worldbody>
  <body name="post"><joint name="slew" axis="0 0 1" range="-2 2"/><geom size=".1" mass="9"/>
   <body name="boom" pos=".2 0 .3"><joint name="lift" axis="0 1 0" range="-1 1"/>
-   <geom size=".1" mass="9"/>
-   <body name="bar" pos=".5 0 0"><joint name="bar" axis="0 1 0"/><geom size=".1" mass="1"/></body>
+   <geom name="drum" size=".1" mass="9"/><site name="eye" pos=".6 0 .4"/>
+   <body name="bar" pos=".5 0 0"><joint name="bar" axis="0 1 0"/><geom size=".1" mass="1"/>
+    <site name="bar" pos=".5 0 0"/></body>
    <body name="stick" pos="2 0 0"><joint name="reach" axis="0 1 0" range="-1 1"/>
     <geom size=".1" mass="9"/>
     <body name="plate" pos="1 0 0">{plate}<geom size=".1" mass="9"/><site name="fork" pos=".6 0 0"/>
  </body></body></body></body></worldbody>
  <tendon><fixed name="both"><joint joint="{last}" coef="1"/><joint joint="lift" coef="1"/></fixed>
+  <spatial name="rope"><site site="eye"/><geom geom="drum"/><site site="fork"/></spatial>
+  <spatial name="beside"><site site="eye"/><site site="bar"/></spatial>
  </tendon>
  <equality>{equality}</equality></mujoco>
 """
@@ -446,6 +449,9 @@ def hinged(folder: Path, equality: str, plate: str = LEVEL) -> Machine:
         ('<joint joint1="reach" joint2="lift"/>', "", "'lift' .* moves with reach"),
         ('<tendon tendon1="both"/>', LEVEL, "'level' .* moves with lift .equality: tendon"),
         ('<tendon tendon1="both"/>', "", "'lift' .* moves with reach .equality: tendon"),
+        ('<tendon tendon1="rope"/>', LEVEL, "'level' .* moves with reach .equality: tendon"),
+        ('<tendon tendon1="rope"/>', "", "'reach' .* is held .equality: tendon"),
+        ('<joint joint1="reach"/>', "", "'reach' .* is held .equality: joint"),
         ('<connect body1="bar" body2="plate" anchor="0 0 .3"/>', LEVEL, "equality: connect"),
         ('<weld body1="bar" body2="plate"/>', LEVEL, "'level' .* moves with bar and reach"),
     ],
@@ -463,6 +469,7 @@ def test_an_equality_that_moves_no_joint_on_the_way_changes_nothing(tmp_path: Pa
     for equality in (
         '<joint joint1="bar" joint2="lift"/>',
         '<joint joint1="level"/>',
+        '<tendon tendon1="beside"/>',
         '<connect body1="bar" body2="stick" anchor="0 0 .3"/>',
         '<joint joint1="level" joint2="lift" active="false"/>',
     ):

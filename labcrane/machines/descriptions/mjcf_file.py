@@ -106,6 +106,8 @@ class MjcfFile:
         for at in np.flatnonzero(self._model.eq_active0):
             kind = self._mujoco.mjtEq(self._model.eq_type[at])
             tied = self._tied(int(at), kind)
+            if kind == self._mujoco.mjtEq.mjEQ_JOINT and len(tied) == 1:
+                tied -= self._kept(int(at), passive)
             bound = [*sorted(tied & passive), *sorted(tied & ours - passive)]
             if tied & passive or len(bound) > 1 or (bound and len(tied) == 1):
                 others = " and ".join(self._names[each] for each in sorted(tied - {bound[0]}))
@@ -117,8 +119,6 @@ class MjcfFile:
         model, kinds = self._model, self._mujoco.mjtEq
         ends = [int(each[at]) for each in (model.eq_obj1id, model.eq_obj2id)]
         if kind == kinds.mjEQ_JOINT:
-            if ends[1] < 0 and model.eq_data[at, 0] == 0.0:
-                return set()  # held where the file has it, where it stays here too
             return {each for each in ends if each >= 0}
         if kind == kinds.mjEQ_TENDON:
             return {joint for tendon in ends if tendon >= 0 for joint in self._counted(tendon)}
@@ -126,17 +126,35 @@ class MjcfFile:
             return set()
         if model.eq_objtype[at] == self._mujoco.mjtObj.mjOBJ_SITE:
             ends = [int(model.site_bodyid[each]) for each in ends]
-        # The loop that they close is of the joints below which only one of the two lies.
-        below = [set(self._way(each)) for each in ends]
-        loop = below[0] ^ below[1]
-        return {joint for joint, body in enumerate(model.jnt_bodyid) if int(body) in loop}
+        return self._between(ends)
+
+    def _kept(self, at: int, passive: Collection[int]) -> set[int]:
+        """Return the joint that an equality holds where the file has it: it stays here too."""
+        held = int(self._model.eq_obj1id[at])
+        return {held} if held in passive and self._model.eq_data[at, 0] == 0.0 else set()
+
+    def _between(self, bodies: Sequence[int]) -> set[int]:
+        """Return the joints that move some of the bodies and not all: a loop would be of these."""
+        above = [set(self._way(each)) for each in bodies]
+        loop = set[int]().union(*above) - above[0].intersection(*above)
+        return {joint for joint, body in enumerate(self._model.jnt_bodyid) if int(body) in loop}
 
     def _counted(self, tendon: int) -> set[int]:
-        """Return the joints that a tendon counts; of one with a way through space, none."""
-        model, joint = self._model, int(self._mujoco.mjtWrap.mjWRAP_JOINT)
+        """Return the joints that a tendon counts, or that move a part of its way through space."""
+        model, wraps = self._model, self._mujoco.mjtWrap
         start = int(model.tendon_adr[tendon])
-        parts = range(start, start + int(model.tendon_num[tendon]))
-        return {int(model.wrap_objid[at]) for at in parts if model.wrap_type[at] == joint}
+        joints: set[int] = set()
+        bodies: list[int] = []
+        for at in range(start, start + int(model.tendon_num[tendon])):
+            part = int(model.wrap_objid[at])
+            match wraps(model.wrap_type[at]):
+                case wraps.mjWRAP_JOINT:
+                    joints.add(part)
+                case wraps.mjWRAP_SITE:
+                    bodies.append(int(model.site_bodyid[part]))
+                case wraps.mjWRAP_SPHERE | wraps.mjWRAP_CYLINDER:
+                    bodies.append(int(model.geom_bodyid[part]))
+        return joints | (self._between(bodies) if bodies else set())
 
     def tip(self, name: str) -> FloatArray:
         """Return where a site or the origin of a body is at zero, in m, shape ``(3,)``."""
