@@ -47,7 +47,8 @@ class CanReplay(InputDevice):
             with can.LogReader(settings.file) as log:
                 self._frames = list(log)
                 relative = getattr(log, "timestamps_format", "") == "relative"
-        except (OSError, ValueError, can.CanError) as error:
+        # Of damaged files python-can's readers let through also struct's and zlib's errors.
+        except Exception as error:
             raise ProtocolError(
                 f"{settings.file} cannot be read as a candump, asc or blf log: {error}"
             ) from error

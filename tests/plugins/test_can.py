@@ -1,5 +1,6 @@
 """A panel on a CAN bus: frames, time-outs, unplugging, replay, and what is no command."""
 
+import random
 import re
 import time
 from pathlib import Path
@@ -295,6 +296,27 @@ def test_what_is_no_log_is_refused_in_words(tmp_path: Path) -> None:
         CanReplay(ReplaySettings(file=tmp_path / "empty.log", valves=VALVES), ch8())
     with pytest.raises(ProtocolError, match=r"no.asc cannot be read as a candump, asc or blf log"):
         CanReplay(ReplaySettings(file=tmp_path / "no.asc", valves=VALVES), ch8())
+
+
+# python-can leaves a damaged blf log open until it is collected.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("ending", ["log", "asc", "blf", "trc"])
+def test_a_damaged_log_is_read_or_refused_in_words(tmp_path: Path, ending: str, seed: int) -> None:
+    draw = random.Random(seed)
+    whole = a_log(tmp_path / f"panel.{ending}").read_bytes()
+    flipped = bytearray(whole)
+    for _ in range(3):
+        flipped[draw.randrange(len(whole))] = draw.randrange(256)
+    path = tmp_path / f"damaged.{ending}"
+    settings = ReplaySettings(file=path, valves=VALVES)
+    for damaged in (whole[: draw.randrange(1, len(whole))], bytes(flipped), b"?" + whole):
+        path.write_bytes(damaged)
+        try:
+            CanReplay(settings, ch8())
+        except ProtocolError as error:
+            assert re.search(rf"damaged\.{ending} |the clock of .*damaged", str(error))  # noqa: PT017
 
 
 def test_a_flooded_bus_holds_the_machine_and_says_so() -> None:
