@@ -472,8 +472,9 @@ def _is_lost(value: object) -> bool:
 
 
 def gaze_measures(
-    seen: Looks, started: float, onset: float, offset: float, look_least_s: float = 0.066
-) -> dict[str, float]:
+    seen: Looks, started: float, onset: float, offset: float, look_least_s: float = 0.066,
+    pauses: Sequence[tuple[float, float]] = (),
+) -> dict[str, float]:  # fmt: skip
     """Return how much of gaze is known, and dwell and first look for each area.
 
     ``gaze_valid_before`` and ``gaze_valid_during`` are the shares of the time from the trial's
@@ -488,16 +489,53 @@ def gaze_measures(
         Of trial and movement, on our clock, in seconds.
     look_least_s
         How long a first look lasts at least, in seconds: less is no fixation.
+    pauses
+        When the trial was paused and when it went on, on our clock, in seconds, rising. They are no
+        part of any time, as they are of no other measure.
     """
-    found = {
-        "gaze_valid_before": seen.valid(started, onset),
-        "gaze_valid_during": seen.valid(onset, offset),
+    parts = {
+        "before": _between(pauses, started, onset),
+        "during": _between(pauses, onset, offset),
     }
+    found = {f"gaze_valid_{part}": _valid(seen, pieces) for part, pieces in parts.items()}
     for area in seen.areas:
-        found[f"dwell_before_{area}"] = seen.dwell(area, started, onset)
-        found[f"dwell_during_{area}"] = seen.dwell(area, onset, offset)
-        found[f"look_lead_{area}"] = onset - seen.first(area, started, onset, look_least_s)
+        for part, pieces in parts.items():
+            found[f"dwell_{part}_{area}"] = _dwell(seen, area, pieces)
+        found[f"look_lead_{area}"] = _lead(seen, area, parts["before"], look_least_s)
     return found
+
+
+Pieces = Sequence[tuple[float, float]]
+"""From when to when, in s: a time without the pauses in it."""
+
+
+def _between(pauses: Pieces, start: float, stop: float) -> Pieces:
+    within = [(since, until) for since, until in pauses if start < until and since < stop]
+    begins = [start, *(until for _, until in within)]
+    ends = [*(since for since, _ in within), stop]
+    return [(max(begin, start), end) for begin, end in zip(begins, ends, strict=True)]
+
+
+def _valid(seen: Looks, pieces: Pieces) -> float:
+    lasts = [max(end - begin, 0.0) for begin, end in pieces]
+    known = [
+        seen.valid(*piece) * length for piece, length in zip(pieces, lasts, strict=True) if length
+    ]
+    return sum(known) / sum(lasts) if known else math.nan
+
+
+def _dwell(seen: Looks, area: str, pieces: Pieces) -> float:
+    known = [dwell for piece in pieces if not math.isnan(dwell := seen.dwell(area, *piece))]
+    return sum(known) if known else math.nan
+
+
+def _lead(seen: Looks, area: str, pieces: Pieces, least_s: float) -> float:
+    """Return the time from the first look at an area to the end of the last piece."""
+    for at, (begin, end) in enumerate(pieces):
+        first = seen.first(area, begin, end, least_s)
+        if not math.isnan(first):
+            return end - first + sum(until - since for since, until in pieces[at + 1 :])
+    return math.nan
 
 
 def with_unseen_areas(movements: "pd.DataFrame") -> "pd.DataFrame":

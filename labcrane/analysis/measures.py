@@ -171,8 +171,9 @@ def measure_session(
         if seen is not None and span is not None:
             due = movement.due
             row |= gaze_measures(
-                seen, due[0], due[span.start], due[span.stop - 1], settings.look_least_s
-            )
+                seen, due[0], due[span.start], due[span.stop - 1], settings.look_least_s,
+                movement.pauses,
+            )  # fmt: skip
         rows.append(row)
     measured = pd.DataFrame(rows, index=trials.index)
     if measured["measured_anew"].any():

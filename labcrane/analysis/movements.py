@@ -89,6 +89,17 @@ class Movement:
         last = int(np.searchsorted(self.elapsed, onset + duration - ROUNDING_S))
         return slice(first, last + 1)
 
+    @property
+    def pauses(self) -> list[tuple[float, float]]:
+        """When it was paused and when it went on, on the run's clock, in seconds.
+
+        The run's clock goes on in a pause, and the trial's does not.
+        """
+        tick = 1.0 / self.rate_hz
+        more = np.diff(self.due) - np.diff(self.elapsed)
+        at = np.flatnonzero(more > tick / 2.0)
+        return [(float(self.due[i] + tick), float(self.due[i + 1])) for i in at]
+
     def result(self, name: str) -> float:
         """Return a number of the trial table, in s, m or what its column is in; NaN for none."""
         value = self.row.get(name, np.nan)

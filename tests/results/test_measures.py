@@ -1,6 +1,7 @@
 """Measures of recorded movements, and gaze."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -9,7 +10,7 @@ import pytest
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.gaze import Looks, gaze_measures, looks, with_unseen_areas
 from labcrane.analysis.measures import MeasureSettings, measure_session, measures_of
-from labcrane.analysis.movements import cut, groups, machine_of
+from labcrane.analysis.movements import Movement, cut, groups, machine_of
 from labcrane.analysis.sticks import reversals
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.testing.exporters import MOVEMENT_S, make_participant
@@ -148,6 +149,46 @@ def test_an_area_that_only_others_looked_at_has_0_s_and_does_not_raise_their_mea
     assert found["dwell_during_a"].mean() == 0.5
     assert found["look_lead_a"].isna().all()
     assert with_unseen_areas(pd.DataFrame({"dwell_during_a": [np.nan]})).isna().all(axis=None)
+
+
+def test_a_pause_is_no_time_of_gaze_wherever_it_comes() -> None:
+    """The eyes see the same as without it, and anything at all while it lasts."""
+    random = np.random.default_rng(381)
+    own = np.arange(0.0, 10.0, 0.01)
+    for _ in range(50):
+        onset, offset = np.sort(random.choice(own[100:-100], 2, replace=False))
+        areas = np.repeat(random.choice(["", "a", "b"], 100), 10)
+        tracked = np.repeat(random.random(50) > 0.3, 20)
+        areas[~tracked] = ""
+        whole = gaze_measures(
+            Looks(own, areas.tolist(), tracked, ["a", "b"]), 0.0, onset, offset, 0.0
+        )
+        number = int(random.integers(1, 4))
+        began = np.sort(random.choice(own[20:-20:50], number, replace=False))
+        lasted = random.uniform(1.0, 60.0, number)
+        later = (lasted[:, None] * (own >= began[:, None] - 1e-9)).sum(axis=0)
+        starts = began + np.concatenate([[0.0], np.cumsum(lasted)[:-1]])
+        pauses = list(zip(starts.tolist(), (starts + lasted).tolist(), strict=True))
+        meanwhile = np.concatenate([np.arange(a + 0.005, b, 0.01) for a, b in pauses])
+        time = np.concatenate([own + later, meanwhile])
+        order = np.argsort(time)
+        names = np.concatenate([areas, np.full(len(meanwhile), "a")])[order].tolist()
+        known = np.concatenate([tracked, np.ones(len(meanwhile), bool)])[order]
+        at = [float(each + later[np.searchsorted(own, each - 1e-9)]) for each in (onset, offset)]
+        found = gaze_measures(
+            Looks(time[order], names, known, ["a", "b"]), 0.0, at[0], at[1], 0.0, pauses
+        )
+        for name, value in whole.items():
+            assert found[name] == pytest.approx(value, abs=0.03, nan_ok=True), name
+
+
+def test_a_movement_knows_its_pauses_by_the_clock_of_the_trial_that_stood_still() -> None:
+    elapsed = np.arange(0.0, 1.0, 0.01)
+    due = 5.0 + elapsed + np.where(elapsed > 0.305, 20.0, 0.0) + np.where(elapsed > 0.705, 1.0, 0.0)
+    nothing = np.zeros((100, 3))
+    movement = Movement({}, 100.0, due, elapsed, nothing, nothing, {}, nothing, nothing)
+    np.testing.assert_allclose(movement.pauses, [(5.31, 25.31), (25.71, 26.71)])
+    assert replace(movement, due=5.0 + elapsed).pauses == []
 
 
 def turns_one_by_one(axis: list[float], hysteresis: float) -> int:
