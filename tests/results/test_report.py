@@ -16,7 +16,7 @@ from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_
 from labcrane.analysis.report import figures, report
 from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.report.html import Page
-from labcrane.analysis.report.outcomes import gaze_tests, measures_in
+from labcrane.analysis.report.outcomes import gaze_table, gaze_tests, little_gaze, measures_in
 from labcrane.analysis.report.panels import Panel, Series, svg_of
 from labcrane.analysis.report.report import write_report
 from labcrane.analysis.report.sample import in_words, sample
@@ -129,7 +129,8 @@ def test_areas_looked_at_are_told_of_fewer_people_too_than_a_test_needs(folder: 
     kept = movements[is_result(movements)]
     assert kept.dropna(subset=["dwell_during_1"])["participant"].nunique() == 2
     looked = pd.read_csv(folder / "tables" / "gaze.csv").set_index("distance")
-    for name in ("dwell_before_1", "dwell_during_1", "look_lead_1"):
+    valid = ("gaze_valid_before", "gaze_valid_during")
+    for name in ("dwell_before_1", "dwell_during_1", "look_lead_1", *valid):
         for distance, own in kept.groupby("distance"):
             means = own.groupby("participant")[name].mean().dropna()
             assert looked.loc[distance, name] == pytest.approx(np.mean(list(means)))
@@ -205,6 +206,26 @@ def test_a_mean_of_two_people_has_no_bar_in_figures_and_its_interval_in_the_tabl
     few = drawing.table[drawing.table["distance"] == 2.0]
     assert (few["ci_high"] > few["mean"]).all()
     assert "where three or more are in it" in drawing.caption
+
+
+def test_means_of_dwell_say_how_much_of_gaze_is_known_and_how_many_movements_lost_half() -> None:
+    random = np.random.default_rng(462)
+    rows = [
+        {"participant": f"P{person:03}", "sequence": place, "distance": distance,
+         "outcome": "success", "dwell_during_grapple": 0.1,
+         "gaze_valid_before": random.uniform(0.0, 1.0),
+         "gaze_valid_during": random.choice([np.nan, 0.0, 0.49, 0.5, 1.0])}
+        for person in range(5) for place, distance in enumerate([2.0, 4.0, 2.0, 4.0])
+    ]  # fmt: skip
+    table = with_factors(pd.DataFrame(rows))
+    few = [row["gaze_valid_before"] < 0.5 or row["gaze_valid_during"] < 0.5 for row in rows]
+    assert 0 < sum(few) < len(rows)
+    assert little_gaze(table) == sum(few)
+    shown = gaze_table(table, factors_of(table)).set_index("distance")
+    for distance in (2.0, 4.0):
+        own = [row["gaze_valid_before"] for row in rows if row["distance"] == distance]
+        assert shown.loc[distance, "gaze_valid_before"] == pytest.approx(np.mean(own))
+    assert little_gaze(table.drop(columns=["gaze_valid_before", "gaze_valid_during"])) == 0
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -355,13 +355,30 @@ def occasions(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
     return own
 
 
+GAZE_VALID = ("gaze_valid_before", "gaze_valid_during")
+"""Columns of the shares of a time in which it is known where somebody looked."""
+
+HALF = 0.5
+"""Share of the time below which the report warns of dwell: what is not known counts as no look."""
+
+
+def little_gaze(results: "pd.DataFrame") -> int:
+    """Return in how many movements gaze is not known for half of the time before or during them."""
+    shares = results[[name for name in GAZE_VALID if name in results]]
+    return int((shares < HALF).any(axis=1).sum())
+
+
 def gaze_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
-    """Return means over participants' means of how long areas were looked at, and of how many."""
+    """Return means over participants' means of how long areas were looked at, and of how many.
+
+    Beside them, in which share of the time it is known where somebody looked.
+    """
     import pandas as pd
 
     columns = of_gaze(results)
     if not columns:
         return pd.DataFrame()
+    columns += [name for name in GAZE_VALID if name in results]
     by = [*factors.between, *factors.by_phase, DISTANCE]
     each = results.groupby([*by, "participant"])[columns].mean()
     cells = each.groupby(level=by)

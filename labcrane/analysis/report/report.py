@@ -434,8 +434,15 @@ def _gaze(page: Page, results: "pd.DataFrame", factors: Factors) -> "pd.DataFram
         page.say(
             "How long areas were looked at, before onset and during movements, and how long before "
             "onset first, in seconds. Tests are of one area each, without a correction for their "
-            "number."
+            "number. gaze_valid is the share of the time in which it is known where somebody "
+            "looked; the rest counts as no look."
         )
+        if little := outcomes.little_gaze(results):
+            page.say(
+                f"In {little} of {len(results)} movements it is known for less than half of the "
+                "time before onset, or of the movement, where somebody looked: how long areas were "
+                "looked at is too little there, or missing."
+            )
         page.table("gaze", looked)
         if len(tests):
             page.table("gaze_tests", tests)
