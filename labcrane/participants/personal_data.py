@@ -12,6 +12,7 @@ _DOMAIN_END = re.compile(r"\.\w\w")
 # Not telephone numbers, though they have many digits.
 _HARMLESS = re.compile(
     r"\b\d{4}-\d\d-\d\d\b|\b\d{1,2}:\d\d(:\d\d)?\b|(?<![\d.])[-+]?\d+\.\d+(?![\d.])"
+    r"|\b(ISO|IEC|DIN|EN|SAE)( J|[ /](TR|TS|EN|ISO|IEC))*[ -]?\d{3,5}(-\d{1,4})?(:(19|20)\d\d)?\b"
 )
 _DIGITS = re.compile(r"\+?\(?\d(?:[ ()/.\-]{0,2}\d)+")
 PHONE_DIGITS = 7

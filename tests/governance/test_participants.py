@@ -191,6 +191,10 @@ def test_a_pseudonym_that_does_not_match_is_refused(lab: Lab) -> None:
         ("trial 12 of 2026-11-21 at 14:30:05 was 3.25 m off", None),
         ("0.123 0.456 0.789 m", None),
         ("seen @ block 3", None),
+        ("index of difficulty, log2(distance / width + 1) (ISO 9241-411:2012)", None),
+        ("DIN EN ISO 10968 and ISO/TS 15666-2021", None),
+        ("DIN 0171 1234567", "a telephone number"),
+        ("ISO 9241-411, call 600 123 456", "a telephone number"),
     ],
 )
 def test_what_leads_to_a_person_is_found(text: str, found: str | None) -> None:
