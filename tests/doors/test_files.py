@@ -381,8 +381,10 @@ def test_a_damaged_participant_file_is_read_as_written_or_refused_in_words(
     lab: Path, tmp_path: Path
 ) -> None:
     good = lab / "P003" / "P003.h5"
-    found = fuzz(good.read_bytes(), tmp_path / "damaged.h5", ReadRecording(good), 60, seed=1)
-    assert min(found.values()) > 5
+    read = ReadRecording(good)
+    assert read(good)
+    found = fuzz(good.read_bytes(), tmp_path / "damaged.h5", read, 60, seed=1)
+    assert found["refused"] > 30  # some draws change nothing; how many is chance
 
 
 @pytest.mark.slow
