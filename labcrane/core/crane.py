@@ -20,6 +20,10 @@ from labcrane.types import FloatArray
 
 ROUNDING_S = 1e-9
 
+ENGINE_DEVIATION = 1e-9
+"""By how much angles and speeds of a compiled twin may differ from an engine's, in rad and rad/s:
+it rounds otherwise, by some 1e-14."""
+
 
 def crane_signals(machine: Machine) -> tuple[Signal, ...]:
     """Return what a crane's state holds, in order."""
@@ -103,12 +107,33 @@ class Crane(Dynamics):
         actuator = self._settings.actuator.model_dump()
         return {f"actuator.{name}": value for name, value in actuator.items()}
 
-    def twin_of(self, step: object, further: Sequence[float] = (), deviation: float = 0.0) -> Twin:
-        """Return the twin of a crane that follows the velocity law, for its compiled ``step``.
+    def law_twin(self) -> Twin:
+        """Return the twin of a crane that follows the velocity law in every tick.
 
-        ``step`` is told the numbers of the machine and of its actuator, ``further`` ones, then
-        angles, speeds, the actuator's speeds and commands on their way, which it keeps up to date;
-        :meth:`_stand` and :meth:`_motion` are then the crane's own.
+        Its :meth:`_stand` and :meth:`_motion` put it where its twin came, and say where it is.
+        """
+        from labcrane.core.compiled_crane import step  # noqa: PLC0415 - loads numba
+
+        return self._twin_of(step)
+
+    def engine_twin(self) -> Twin | None:
+        """Return the twin of a crane in an engine, for ticks in which all drives have the torque.
+
+        All others are the engine's. None for a crane that is not made of beams on the slew axis,
+        whose equations it has not.
+        """
+        slew, *_ = joints = self._machine.joints
+        if slew.a or any(joint.inertia_kgm2 or joint.centre_m for joint in joints):
+            return None
+        from labcrane.core.compiled_crane import links_of, step_engine  # noqa: PLC0415 - loads numba
+
+        return self._twin_of(step_engine, links_of(self._machine), ENGINE_DEVIATION)
+
+    def _twin_of(self, step: object, further: Sequence[float] = (), deviation: float = 0.0) -> Twin:
+        """Return the twin for a compiled ``step``.
+
+        It is told the numbers of the machine and of its actuator, ``further`` ones, then angles,
+        speeds, the actuator's speeds and commands on their way, which it keeps up to date.
         """
         joints, actuator = self._machine.joints, self._actuator
         ideal, share, *most = actuator.constants

@@ -29,10 +29,6 @@ LIMIT_FORCE = 1e7
 """In N m. The engine's own is 24 kN m at 240 Hz, through which a crane's drives push any joint; the
 URDF's effort is not used for it (bullet3 #2944)."""
 
-DEVIATION = 1e-9
-"""By how much angles and speeds of the compiled twin may differ from the engine's, in rad and
-rad/s: it rounds otherwise, by some 1e-14."""
-
 
 class BulletCrane(Crane):
     """Velocity motors that hold against gravity up to each joint's effort.
@@ -75,12 +71,7 @@ class BulletCrane(Crane):
         return {**super().metadata(), "engine": f"pybullet {version('pybullet')}"}
 
     def twin(self) -> Twin | None:
-        slew, *_ = joints = self._machine.joints
-        if slew.a or any(joint.inertia_kgm2 or joint.centre_m for joint in joints):
-            return None  # its equations are those of beams on the slew axis
-        from labcrane_bullet.compiled import step_engine  # noqa: PLC0415 - loads numba
-
-        return self.twin_of(step_engine, _links(self._machine), DEVIATION)
+        return self.engine_twin()
 
     def _motion(self) -> tuple[Sequence[float], Sequence[float]]:
         return self._angles, self._speeds
@@ -185,20 +176,3 @@ def _prepare(body: int, joint: int, client: int) -> None:
         physicsClientId=client,
     )
     pybullet.changeDynamics(body, joint, jointLimitForce=LIMIT_FORCE, physicsClientId=client)
-
-
-def _links(machine: Machine) -> list[float]:
-    """Return the links' masses, centres and moments of inertia, as in the URDF, and efforts."""
-    slew, *chain = machine.joints
-    wide = slew.thickness * slew.thickness
-    upright = [slew.mass_kg / 12.0 * 2.0 * wide]
-    along, across = [0.0], [0.0]  # the column turns about its own axis only
-    for joint in chain:
-        x, side = (edge * edge for edge in (joint.a or joint.thickness, joint.thickness))
-        along.append(joint.mass_kg / 12.0 * 2.0 * side)
-        across.append(joint.mass_kg / 12.0 * (x + side))
-        upright.append(joint.mass_kg / 12.0 * (x + side))
-    masses = [joint.mass_kg for joint in machine.joints]
-    centres = [0.0, *(0.5 * joint.a for joint in chain)]
-    efforts = [joint.effort for joint in machine.joints]
-    return [*masses, *centres, *along, *across, *upright, *efforts]

@@ -13,9 +13,7 @@ class KinematicCrane(Crane):
     """
 
     def twin(self) -> Twin:
-        from labcrane_bullet.compiled import step  # noqa: PLC0415 - loads numba
-
-        return self.twin_of(step)
+        return self.law_twin()
 
     def _stand(self, angles: Sequence[float], speeds: Sequence[float]) -> None:
         self._angles = list(angles)

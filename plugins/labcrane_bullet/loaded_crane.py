@@ -20,9 +20,6 @@ class LoadedBulletCrane(LoadedCrane, BulletCrane):
         if settings.grapple is None:  # with one, every tick is the solver's, and few are strained
             self._passes = PASSES
 
-    def twin(self) -> None:
-        return None  # what hangs on it swings by the engine's law
-
     def _place(self, angles: Sequence[float]) -> None:
         super()._place(angles)
         if self._loaded.grapple is None:

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from labcrane import FloatArray, Machine, Run
-from labcrane.core import Crane, CraneSettings, Value
+from labcrane.core import Crane, CraneSettings, Twin, Value
 from labcrane.machines import GRAVITY, urdf_of
 from labcrane_mujoco.limited_drives import limited_torques
 
@@ -62,6 +62,16 @@ class MujocoCrane(Crane):
 
     def metadata(self) -> Mapping[str, Value]:
         return {**super().metadata(), "engine": f"mujoco {version('mujoco')}"}
+
+    def twin(self) -> Twin | None:
+        return self.engine_twin()
+
+    def _motion(self) -> tuple[Sequence[float], Sequence[float]]:
+        return self._angles, self._speeds
+
+    def _stand(self, angles: Sequence[float], speeds: Sequence[float]) -> None:
+        self._positions[:], self._velocities[:] = angles, speeds
+        self._begin()
 
     def _urdf(self) -> str:
         return urdf_of(self._machine)

@@ -6,14 +6,17 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
 from needs import need
 
 from labcrane.machines.library import find_machine
+from labcrane.recording.participant_file.reader import open_recording
 from labcrane.simulation import fast_forward
 from labcrane.simulation.simulation import WAY, SimulationJob, simulate
 
 AHEAD = "ahead.yaml"
+CH8 = ("slew", "shoulder", "elbow", "wrist")
 
 HEAD = """\
 labcrane: 1
@@ -140,6 +143,37 @@ def test_twins_make_the_bits_of_the_loop_in_journals_and_participant_files(
         assert (fast / journal).read_bytes() == (slow / journal).read_bytes()
     (file,) = fast.glob("*.h5")
     assert held(file) == held(slow / file.name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("engine", "package"), [("bullet_crane", "pybullet"), ("mujoco_crane", "mujoco")]
+)
+@pytest.mark.parametrize("rule", RULES)
+def test_an_engine_goes_on_where_its_twin_came_so_that_both_ways_do_the_same_study(
+    tmp_path: Path, engine: str, package: str, rule: str
+):
+    need("numba", package)
+    text = drawn_study(RULES.index(rule), "joint_velocity", rule)
+    text = text.replace("kinematic_crane", engine).replace(AHEAD, "ch8")
+    protocol = written(tmp_path, text)
+    fast, way = simulated(protocol, tmp_path / "fast")
+    slow, _ = simulated(protocol, tmp_path / "slow", "asked for")
+    assert (way["compiled"], way["deviation"]) == (True, 1e-9)
+    one, other = (
+        open_recording(folder / f"{folder.name}.h5").session(1) for folder in (fast, slow)
+    )
+    told = ["outcome", "ticks", "started", "ended"]
+    told = [name for name in told if name in one.trials]
+    assert "outcome" in told
+    pd.testing.assert_frame_equal(one.trials[told], other.trials[told], rtol=0.0, atol=0.0)
+    joints = [
+        np.column_stack([session.streams["state"].column(f"joint.angle.{name}") for name in CH8])
+        for session in (one, other)
+    ]
+    assert joints[0].shape == joints[1].shape
+    assert np.ptp(joints[0], axis=0).min() > 0.01, "every joint moves"
+    assert np.abs(joints[0] - joints[1]).max() < 1e-6
 
 
 @pytest.mark.long

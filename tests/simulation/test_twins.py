@@ -1,6 +1,9 @@
 """Every bundled twin beside its component, tick by tick."""
 
+from itertools import product
+
 import pytest
+from cranes import build
 from needs import need, needs
 
 from labcrane import Controller
@@ -45,15 +48,16 @@ class TestCranes(TwinContract):
         return KinematicCrane(CraneSettings.model_validate({"actuator": request.param}), ch8())
 
 
-class TestEngines(TwinContract):
-    @pytest.fixture(params=[{"lag_s": 0.5}, "hydraulic", "ideal"])
-    def component(self, request: pytest.FixtureRequest) -> Component:
-        need("pybullet")
-        from labcrane_bullet.bullet_crane import BulletCrane
+ENGINES = ("bullet_crane", "mujoco_crane")
 
+
+class TestEngines(TwinContract):
+    @pytest.fixture(params=list(product(ENGINES, [{"lag_s": 0.5}, "hydraulic", "ideal"])), ids=str)
+    def component(self, request: pytest.FixtureRequest) -> Component:
+        engine, actuator = request.param
+        need({"bullet_crane": "pybullet", "mujoco_crane": "mujoco"}[engine])
         # Commands of this contract jump: what a drive has not the torque for the engine makes.
-        settings = {"actuator": request.param}
-        return BulletCrane(CraneSettings.model_validate(settings), ch8())
+        return build(engine, ch8(), actuator)
 
 
 class TestTask(TwinContract):

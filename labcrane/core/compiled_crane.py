@@ -1,4 +1,4 @@
-"""Compiled cranes: the actuator, the velocity law and the tip, tick by tick.
+"""Compiled cranes: the actuator, the velocity law and the tip, tick by tick; it loads numba.
 
 With an engine, the law holds while every motor has the torque for it and no joint is near a limit;
 all other ticks are the engine's.
@@ -8,9 +8,10 @@ import math
 
 import numpy as np
 
-from labcrane import FloatArray
-from labcrane.core import Places, compiled, twin
-from labcrane.machines import GRAVITY
+from labcrane.core import compiled, twin
+from labcrane.core.twin import Places
+from labcrane.machines.machine import GRAVITY, Machine
+from labcrane.types import FloatArray
 
 JOINTS, DELAY, DT, BASE_X, HEIGHT, DRIVE, CHANGES, IDEAL, SHARE = range(9)
 """Joints, ticks of dead time, length of a tick, the foot, the first command and where what changes
@@ -167,3 +168,20 @@ def step_engine(own: FloatArray, places: Places, seen: FloatArray, row: FloatArr
     own[at : at + n], own[at + n : at + 2 * n] = angles, speeds
     put_tip(own, angles, speeds, row[state + 2 * n : state + 2 * n + 6])
     return twin.MADE
+
+
+def links_of(machine: Machine) -> list[float]:
+    """Return the links' masses, centres and moments of inertia, as in the URDF, and efforts."""
+    slew, *chain = machine.joints
+    wide = slew.thickness * slew.thickness
+    upright = [slew.mass_kg / 12.0 * 2.0 * wide]
+    along, across = [0.0], [0.0]  # the column turns about its own axis only
+    for joint in chain:
+        x, side = (edge * edge for edge in (joint.a or joint.thickness, joint.thickness))
+        along.append(joint.mass_kg / 12.0 * 2.0 * side)
+        across.append(joint.mass_kg / 12.0 * (x + side))
+        upright.append(joint.mass_kg / 12.0 * (x + side))
+    masses = [joint.mass_kg for joint in machine.joints]
+    centres = [0.0, *(0.5 * joint.a for joint in chain)]
+    efforts = [joint.effort for joint in machine.joints]
+    return [*masses, *centres, *along, *across, *upright, *efforts]
