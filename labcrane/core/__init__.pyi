@@ -1,10 +1,10 @@
 """The public names of this package, and the modules from which they are imported."""
 
 from . import compiled, twin
-from .crane import Crane
-from .crane_settings import CraneSettings, GrappleSettings, LoadedCraneSettings
+from .cranes.crane import Crane
+from .cranes.crane_settings import CraneSettings, GrappleSettings, LoadedCraneSettings
+from .cranes.hanging import LoadedCrane
 from .findings import Finding, Verdict
-from .hanging import LoadedCrane
 from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .primitives import Cylinder, Shape, Sphere, TargetFinder
 from .records import (

@@ -127,20 +127,20 @@ def loaded_by(*arguments: str) -> set[str]:
     return set(modules)
 
 
-@needs("pybullet")
+@needs("mujoco")
 @pytest.mark.parametrize("arguments", [["--help"], ["plugins"], ["check", AIMING]])
 def test_looking_loads_nothing_heavy(arguments: list[str]) -> None:
     modules = loaded_by(*arguments)
     assert not HEAVY & {name.split(".")[0] for name in modules}
 
 
-@needs("pybullet")
+@needs("mujoco")
 def test_checking_a_protocol_imports_only_the_plugins_that_it_names() -> None:
     modules = loaded_by("check", AIMING)
     plugins = {name for name in modules if name.startswith("labcrane_") and "." not in name}
     named = (
         "aiming",
-        "bullet",
+        "mujoco",
         "joystick",
         "operator",
         "schemes",
@@ -151,7 +151,7 @@ def test_checking_a_protocol_imports_only_the_plugins_that_it_names() -> None:
     assert plugins == {f"labcrane_{name}" for name in named}, "is labcrane installed as it is now?"
 
 
-@needs("pybullet")
+@needs("mujoco")
 def test_checking_a_protocol_loads_nothing_that_works_with_what_it_says() -> None:
     modules = loaded_by("check", AIMING)
     working = {

@@ -53,7 +53,8 @@ def test_the_demo_takes_the_best_engine_there_is_and_its_recording_is_replayed_o
 ) -> None:
     said = command_without(without, "demo", cwd=tmp_path)
     assert f"moved by:         {engine}\n" in said
-    assert f"without bullet_crane: it needs pybullet, which is not installed: {LAB}" in said
+    missing = f"without mujoco_crane: it needs mujoco, which is not installed: {LAB}"
+    assert (missing in said) == ("mujoco" in without)
     recording = next((tmp_path / "labcrane-demo").rglob("*.h5"))
     assert engine in labcrane.open_recording(recording).session(1).context["protocol"]
     replayed = command_without(without, "replay", str(recording), "--session", "1", cwd=tmp_path)
@@ -108,7 +109,7 @@ def test_fast_without_simulate_is_refused(
     assert "--fast needs --simulate" in capsys.readouterr().err
 
 
-@needs("pybullet")
+@needs("mujoco")
 def test_check_says_that_a_protocol_is_fine(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(AIMING)]) == 0
     assert "study 'aiming' is fine: 1 session on the CH8 knuckle boom" in capsys.readouterr().out

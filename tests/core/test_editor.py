@@ -153,7 +153,7 @@ def own_server() -> Sequence[str]:
 
 
 @pytest.mark.slow
-@needs("pybullet")
+@needs("mujoco")
 def test_labcranes_language_server_marks_what_a_check_finds(
     folder: Path, registry: Registry, own_server: Sequence[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -175,7 +175,7 @@ def test_labcranes_language_server_marks_what_a_check_finds(
 
 
 @pytest.mark.slow
-@needs("pybullet")
+@needs("mujoco")
 def test_mistakes_in_another_file_are_marked_where_the_protocol_names_it(
     tmp_path: Path, own_server: Sequence[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -193,7 +193,7 @@ def test_mistakes_in_another_file_are_marked_where_the_protocol_names_it(
         assert editor.save(path) == []
 
 
-@needs("pybullet")
+@needs("mujoco")
 def test_the_supervisors_page_asks_what_a_check_asks(
     folder: Path, registry: Registry, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -138,7 +138,7 @@ def test_a_wrong_name_of_a_robots_file_is_told_where_the_protocol_has_it(
         "elbow: joint3, wrist: joint4}, tip: gripper, rest_deg: {elbow: 60}}"
     )
     right = AIMING.replace("machine: ch8", machine).replace("[2, 3, 4, 6], width: 0.5", NEAR)
-    right = right.replace("bullet_crane, actuator: ideal", "kinematic_crane")
+    right = right.replace("mujoco_crane, actuator: ideal", "kinematic_crane")
     assert told("aiming", right)[0].count("openmanipulator_x.urdf' does not exist") == 1
     folder = tmp_path / "aiming"
     shutil.copy(PROTOCOLS.parent / "examples" / "machines" / "openmanipulator_x.urdf", folder)
@@ -665,7 +665,7 @@ def test_a_question_of_a_described_machine_is_asked_where_the_joint_is(
 ) -> None:
     machine = f"machine: {{urdf: openmanipulator_x.urdf, joints: {joints}, tip: gripper{more}}}"
     text = AIMING.replace("machine: ch8", machine).replace("[2, 3, 4, 6], width: 0.5", NEAR)
-    text = text.replace("bullet_crane, actuator: ideal", "kinematic_crane")
+    text = text.replace("mujoco_crane, actuator: ideal", "kinematic_crane")
     told("aiming", text)
     folder = tmp_path / "aiming"
     robot = (PROTOCOLS.parent / "examples" / "machines" / "openmanipulator_x.urdf").read_text()

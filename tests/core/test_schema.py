@@ -94,7 +94,7 @@ def test_show_tells_settings_with_units_and_defaults_signals_and_an_example(
 
 
 @pytest.mark.slow
-@needs("pybullet")
+@needs("mujoco", "pybullet")
 def test_every_offer_can_be_shown_and_its_example_is_what_a_protocol_takes(
     schema: "Draft202012Validator", capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -115,7 +115,7 @@ def test_what_is_not_there_is_not_shown(capsys: pytest.CaptureFixture[str]) -> N
     assert "nothing called 'spere' is installed; did you mean 'sphere'?" in capsys.readouterr().err
 
 
-@needs("pybullet")
+@needs("mujoco")
 def test_lists_checks_and_plans_are_there_for_programs(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

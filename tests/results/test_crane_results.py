@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from cranes import needs_bullet
+from cranes import needs_mujoco
 from needs import needs
 
 from labcrane.analysis.cohort import find_cohort
@@ -20,7 +20,7 @@ from labcrane.cli.app import main
 from results.consumers import needs_emmeans, needs_r, r, table
 
 # Without the compiled twins, half an hour.
-pytestmark = [pytest.mark.long, pytest.mark.timeout(1800), needs("numba"), needs_bullet]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(1800), needs("numba"), needs_mujoco]
 
 STUDY = Path(__file__).parents[2] / "protocols" / "crane_pilot"
 PEOPLE, POSITIONS, DISTANCES, MOVEMENTS = 36, 8, 4, 4

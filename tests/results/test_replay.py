@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from needs import needs
+from cranes import engines
 from rehearsal import SHORT, a_study
 
 import labcrane
@@ -38,14 +38,14 @@ def changed_machine(folder: Path) -> Path:
 
 
 @pytest.mark.slow
-@needs("pybullet")
-def test_a_whole_session_on_the_engine_is_bit_identical(tmp_path: Path) -> None:
-    """The aiming study itself: each of its eight pairs of circles on PyBullet, once."""
+@engines
+def test_a_whole_session_on_an_engine_is_bit_identical(tmp_path: Path, name: str) -> None:
+    """The aiming study itself: each of its eight pairs of circles, once."""
     text = (ROOT / "protocols" / "aiming" / "protocol.yaml").read_text(encoding="utf-8")
     (tmp_path / "instructions.md").write_text("Move.", encoding="utf-8")
     quick = "{use: simulated_operator, fitts_a_s: 0.3, fitts_b_s: 0.8, look_s: 0.1}"
     text = text.replace("scheme:", f"operator: {quick}\nscheme:", 1)
-    text = text.replace("movements: 4,", "movements: 1,")
+    text = text.replace("movements: 4,", "movements: 1,").replace("mujoco_crane", name)
     path = record(a_study(tmp_path, text), tmp_path / "data", "P001", simulated=True)
     session = open_recording(path).session(1)
     assert len(session.trials) == 8

@@ -69,7 +69,7 @@ def test_both_protocols_say_in_their_head_what_is_the_papers_and_what_is_ours() 
         assert "# Ours" in head
 
 
-@needs("pybullet")
+@needs("mujoco")
 def test_a_folder_stands_for_its_protocol(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -86,7 +86,7 @@ def test_a_simulated_participant_has_both_times_demographics_and_errors_that_not
     tmp_path: Path,
 ) -> None:
     text = (FOLDER / "protocol.yaml").read_text().replace("rate_hz: 240", "rate_hz: 60")
-    text = text.replace("bullet_crane, actuator: ideal", "kinematic_crane")
+    text = text.replace("mujoco_crane, actuator: ideal", "kinematic_crane")
     (tmp_path / "protocol.yaml").write_text(text)
     for name in ("instructions.md", "cohort.yaml"):
         (tmp_path / name).write_text((FOLDER / name).read_text())

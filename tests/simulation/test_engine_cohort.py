@@ -20,9 +20,9 @@ APART_M = 1e-4
 def simulated(folder: Path, engine: str, names: list[str]) -> list[Recording]:
     """Return the crane study of some people with an engine."""
     text = (STUDY / "protocol.yaml").read_text(encoding="utf-8")
-    assert text.count("bullet_crane") == 1
+    assert text.count("use: mujoco_crane") == 1
     protocol = folder / f"{engine}.yaml"
-    protocol.write_text(text.replace("bullet_crane", engine), encoding="utf-8")
+    protocol.write_text(text.replace("use: mujoco_crane", f"use: {engine}"), encoding="utf-8")
     (folder / "instructions.md").write_bytes((STUDY / "instructions.md").read_bytes())
     cohort = STUDY / "cohort.yaml"
     jobs = [SimulationJob(protocol, cohort, folder / f"{engine}-data", name) for name in names]

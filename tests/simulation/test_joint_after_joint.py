@@ -83,7 +83,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     text = (FOLDER / "protocol.yaml").read_text(encoding="utf-8")
     for before, after in (
         ("rate_hz: 240", f"rate_hz: {RATE_HZ:g}"),
-        ("bullet_crane, actuator: ideal", "kinematic_crane"),
+        ("mujoco_crane, actuator: ideal", "kinematic_crane"),
         ("input: {use: dual_joystick}", "input: {use: dual_joystick}\noperator: {use: one_by_one}"),
         ("distances: [2, 3, 4, 6]", "distances: [2, 6]"),
         ("    movements: 4", "    movements: 2"),

@@ -27,7 +27,7 @@ def test_reaction_time_of_an_operator_without_an_effect_does_not_go_with_distanc
 ) -> None:
     """A share of the peak speed, by which it once was measured, finds one in the same movements."""
     text = (FOLDER / "protocol.yaml").read_text().replace("rate_hz: 240", "rate_hz: 60")
-    text = text.replace("bullet_crane, actuator: ideal", "kinematic_crane")
+    text = text.replace("mujoco_crane, actuator: ideal", "kinematic_crane")
     (tmp_path / "protocol.yaml").write_text(text)
     for name in ("instructions.md", "cohort.yaml"):
         (tmp_path / name).write_text((FOLDER / name).read_text())

@@ -119,14 +119,14 @@ def resume(
     _launch(visit, page=not simulate if page is None else page)
 
 
-ENGINES = ("bullet_crane", "mujoco_crane", "kinematic_crane")
+ENGINES = ("mujoco_crane", "kinematic_crane")
 """What can move the demo's crane, the best one first. The last needs nothing but labcrane."""
 
 
 def demo(
     data: Annotated[Path, typer.Option(help="where the recording goes")] = Path("labcrane-demo"),
 ) -> None:
-    """Run a shortened aiming study with a simulated operator, on the best engine there is."""
+    """Run a shortened aiming study with a simulated operator, on MuJoCo where it is installed."""
     stay_on_this_computer()
     from tempfile import TemporaryDirectory
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from labcrane.core.crane import Crane
-from labcrane.core.crane_settings import GrappleSettings, LoadedCraneSettings
+from labcrane.core.cranes.crane import Crane
+from labcrane.core.cranes.crane_settings import GrappleSettings, LoadedCraneSettings
 from labcrane.core.records import Value
 from labcrane.core.signals import Signal
 from labcrane.machines.machine import Body, Machine

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from labcrane.core.crane_settings import CraneSettings
+from labcrane.core.cranes.crane_settings import CraneSettings
 from labcrane.core.records import Frame, Run, Value
 from labcrane.core.roles import Dynamics
 from labcrane.core.signals import Signal
@@ -112,7 +112,7 @@ class Crane(Dynamics):
 
         Its :meth:`_stand` and :meth:`_motion` put it where its twin came, and say where it is.
         """
-        from labcrane.core.compiled_crane import step  # noqa: PLC0415 - loads numba
+        from labcrane.core.cranes.compiled_crane import step  # noqa: PLC0415 - loads numba
 
         return self._twin_of(step)
 
@@ -125,7 +125,7 @@ class Crane(Dynamics):
         slew, *_ = joints = self._machine.joints
         if slew.a or any(joint.inertia_kgm2 or joint.centre_m for joint in joints):
             return None
-        from labcrane.core.compiled_crane import links_of, step_engine  # noqa: PLC0415 - loads numba
+        from labcrane.core.cranes.compiled_crane import links_of, step_engine  # noqa: PLC0415 - loads numba
 
         return self._twin_of(step_engine, links_of(self._machine), ENGINE_DEVIATION)
 
