@@ -20,7 +20,7 @@ from labcrane.errors import LabcraneError, PluginError, ProtocolError
 
 MODULES = {
     "run": ("demo", "run", "resume"),
-    "check": ("check", "plan"),
+    "check": ("new_study", "check", "plan"),
     "doctor": ("doctor",),
     "plugins": ("schema", "new_plugin"),
     "language_server": ("language_server",),

@@ -8,8 +8,9 @@ from typer.core import TyperCommand, TyperGroup
 
 SECTIONS = {
     "Prepare a study": (
-        "check", "plan", "doctor", "feedback", "simulate", "power", "tracks", "approve", "amend",
-        "methods", "bundle", "plugins", "new-plugin", "schema", "language-server",
+        "new-study", "check", "plan", "doctor", "feedback", "simulate", "power", "tracks",
+        "approve", "amend", "methods", "bundle", "plugins", "new-plugin", "schema",
+        "language-server",
     ),
     "Run it": ("demo", "run", "resume", "consent", "streams", "record"),
     "Analyse it": ("view", "report", "score", "export", "replay", "compare-engines"),

@@ -10,7 +10,7 @@ import pytest
 
 @pytest.mark.parametrize(
     ("typed", "completed"),
-    [("labcrane new-", "new-plugin"), ("labcrane plugins sh", "show"), ("labcrane dmd fi", "fit")],
+    [("labcrane new-p", "new-plugin"), ("labcrane plugins sh", "show"), ("labcrane dmd fi", "fit")],
 )
 def test_commands_are_completed_those_of_plugins_too(typed: str, completed: str) -> None:
     program = Path(sys.executable).with_name("labcrane")

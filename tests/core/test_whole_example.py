@@ -8,7 +8,7 @@ import pytest
 from labcrane import open_recording
 from labcrane.cli.app import main
 
-WHOLE = Path(__file__).parents[2] / "examples" / "whole"
+WHOLE = Path(__file__).parents[2] / "protocols" / "whole"
 STEPS = (
     "  instructions: Move the tip",
     "  questionnaire: about",

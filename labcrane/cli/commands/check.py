@@ -1,4 +1,4 @@
-"""Commands that look and run nothing: check and plan."""
+"""Commands before anything is run: new-study, check and plan."""
 
 import json
 from collections.abc import Sequence
@@ -16,6 +16,17 @@ if TYPE_CHECKING:
     from labcrane.design.tracks import PlannedTrack
     from labcrane.protocol.questions import CheckQuestion
     from labcrane.protocol.study import Study
+
+
+def new_study(
+    shipped: Annotated[str, typer.Argument(help="aiming, crane_pilot, retrieval or whole")],
+    folder: Annotated[Path, typer.Argument(help="a new folder; the study takes its name")],
+) -> None:
+    """Copy a study that comes with labcrane, with everything it refers to, for you to change."""
+    from labcrane.protocol.shipped import new_study as copied
+
+    protocol = copied(shipped, folder)
+    typer.echo(f"study: {protocol}\nnext: labcrane check {folder}, and change {protocol}")
 
 
 def check(
