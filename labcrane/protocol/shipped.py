@@ -15,8 +15,6 @@ FOLDERS = ("protocols", "labcrane_studies")
 LEFT = shutil.ignore_patterns("data", "*.lock*.json")
 """What somebody who ran a study where it is left there: recordings, and its approval."""
 
-NAMED = re.compile(r"^study: .*$", re.MULTILINE)
-
 
 def shipped_studies() -> dict[str, Path]:
     """Return the folders of the studies that come with labcrane, by name."""
@@ -64,7 +62,8 @@ def new_study(shipped: str, folder: Path) -> Path:
         ) from None
     except OSError as error:
         raise ProtocolError(f"{folder} could not be made: {error}") from None
-    protocol = folder / "protocol.yaml"
-    text = protocol.read_text(encoding="utf-8")
-    write_text(protocol, NAMED.sub(f"study: {name}", text, count=1), SHARED_FILE)
-    return protocol
+    named = re.compile(rf"^study: {shipped}(?=\w*$)", re.MULTILINE)
+    for path in folder.glob("*.yaml"):  # the protocol, and its variants for other controls
+        text = path.read_text(encoding="utf-8")
+        write_text(path, named.sub(f"study: {name}", text, count=1), SHARED_FILE)
+    return folder / "protocol.yaml"

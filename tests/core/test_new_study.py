@@ -35,11 +35,15 @@ def test_a_copy_is_a_study_of_its_own_name_that_check_finds_fine(
     shipped = ROOT / "protocols" / name
     copied = {path.relative_to(folder) for path in folder.rglob("*")}
     assert copied == {path.relative_to(shipped) for path in shipped.rglob("*")}
-    before, after = (
-        (each / "protocol.yaml").read_text(encoding="utf-8").splitlines()
-        for each in (shipped, folder)
-    )
-    assert [line for line in after if line not in before] == ["study: my_study"]
+    for each in shipped.glob("*.yaml"):
+        before = each.read_text(encoding="utf-8").splitlines()
+        after = (folder / each.name).read_text(encoding="utf-8").splitlines()
+        changed = [(one, other) for one, other in zip(before, after, strict=True) if one != other]
+        assert changed == [
+            (line, line.replace(f"study: {name}", "study: my_study"))
+            for line in before
+            if line.startswith("study: ")
+        ]
 
 
 def test_recordings_and_an_approval_of_the_study_stay_where_they_are(

@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from ruamel.yaml import YAML
 
 from labcrane import open_recording
 from labcrane.cli.app import main
@@ -33,6 +34,22 @@ def test_the_plan_lists_every_step_of_a_session_in_order(
     said = capsys.readouterr().out
     places = [said.index(step) for step in STEPS]
     assert places == sorted(places)
+
+
+def test_the_variant_for_the_keyboard_is_the_study_but_for_the_controls(
+    protocol: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", str(protocol.with_name("keyboard.yaml"))]) == 0
+    assert capsys.readouterr().err == ""
+    study, variant = (
+        YAML(typ="safe").load(protocol.with_name(name))
+        for name in ("protocol.yaml", "keyboard.yaml")
+    )
+    assert variant["views"]["operator"].pop("keys")
+    differ = {key for key in {*study, *variant} if study.get(key) != variant.get(key)}
+    assert differ == {"study", "title", "input", "operator", "scheme"}
+    keyboard, sticks = variant["scheme"], study["scheme"]
+    assert set(keyboard["map"]) == set(sticks["map"])
 
 
 @pytest.mark.slow

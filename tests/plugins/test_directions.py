@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cranes import needs_bullet
+from cranes import needs_bullet, needs_mujoco
 
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import load
@@ -37,17 +37,46 @@ def maps() -> dict[str, set[tuple[str, ...]]]:
 
 
 def test_every_map_that_is_shipped_has_the_same_directions() -> None:
-    right = {
-        "slew": "-left.x", "base": "-left.x", "elbow": "left.y", "arm": "-left.y",
-        "wrist": "-right.x", "jaws": "right.x", "shoulder": "-right.y", "boom": "-right.y",
-    }  # fmt: skip
     found = maps()
     assert len(found) >= 10
     for path, here in found.items():
         for text in here:
             written = dict(part.split(": ") for part in text)
-            if set(written) <= set(right):  # joints; others name directions of the tip
-                assert written == {joint: right[joint] for joint in written}, path
+            if set(written) <= set(RIGHT):  # joints; others name directions of the tip
+                assert written == {joint: RIGHT[joint] for joint in written}, path
+
+
+RIGHT = {
+    "slew": "-left.x", "base": "-left.x", "elbow": "left.y", "arm": "-left.y",
+    "wrist": "-right.x", "jaws": "right.x", "shoulder": "-right.y", "boom": "-right.y",
+}  # fmt: skip
+"""Which way of which stick moves a joint to positive angles."""
+
+KEYS = {
+    "-left.x": "a", "left.x": "d", "-left.y": "w", "left.y": "s",
+    "-right.x": "j", "right.x": "l", "-right.y": "i", "right.y": "k",
+}  # fmt: skip
+"""Keys that are two sticks, seen from behind them; y is positive when a stick is pulled."""
+
+AXES = re.compile(r"axes: \{(\w+: \[\w, \w\][^}]*)\}")
+
+
+def test_keys_of_a_keyboard_have_the_directions_of_two_sticks() -> None:
+    found = [
+        (path, text)
+        for folder in ("protocols", "docs")
+        for path in sorted((ROOT / folder).rglob("*"))
+        if path.suffix in {".yaml", ".md"}
+        for text in AXES.findall(path.read_text("utf-8"))
+    ]
+    assert len(found) >= 3
+    for path, text in found:
+        keys = re.findall(r"(\w+): \[(\w), (\w)\]", text)
+        for joint, lower, higher in keys:
+            if joint in RIGHT:
+                stick = RIGHT[joint]
+                other = stick[1:] if stick[0] == "-" else f"-{stick}"
+                assert (lower, higher) == (KEYS[other], KEYS[stick]), (path, joint)
 
 
 def moved(study_path: Path, **axes: float) -> tuple[np.ndarray, np.ndarray]:
@@ -79,7 +108,7 @@ def seen(point: np.ndarray) -> tuple[float, float]:
     return (left + right) / 2.0, (top + bottom) / 2.0
 
 
-@needs_bullet
+@needs_mujoco
 @pytest.mark.parametrize("study", ["aiming/protocol.yaml", "crane_pilot/protocol.yaml"])
 def test_the_tip_goes_where_the_stick_points(study: str) -> None:
     path = ROOT / "protocols" / study
