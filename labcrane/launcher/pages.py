@@ -29,7 +29,7 @@ def pages(
     *,
     feedback: bool,
 ) -> Iterator[None]:
-    """Serve both pages while a run lasts; their links are printed once.
+    """Serve both pages while a run lasts; their links are printed when they can be opened.
 
     ``feedback`` is whether views and sounds are started.
     """
@@ -59,8 +59,6 @@ def pages(
     _check_logo(visit.study.path, where)
     handle = PageHandle(order, console.give, say, lambda: launcher.streams_status)
     console.listeners.append(handle.tell)
-    for page, link in handle.links().items():
-        say(f"{page} page: {link}")
     try:
         yield
     finally:

@@ -11,7 +11,7 @@ from labcrane.core.records import Event
 from labcrane.errors import DeviceError
 from labcrane.processes.handle import Patience, ProcessHandle
 from labcrane.session.commands import Command
-from labcrane.web.service import Closed, Opened, PageConfig, Report, Streams, Used
+from labcrane.web.service import Closed, Opened, PageConfig, Report, Served, Streams, Used
 from labcrane.web.state import SessionLeft
 
 MODULE = "labcrane.web.service"
@@ -30,7 +30,7 @@ for a moment, and on a busy computer for some seconds."""
 
 
 class PageHandle:
-    """Keeps the page process running for as long as the run lasts.
+    """Keeps the page process running for as long as the run lasts, and says the pages' links once.
 
     A page that hangs never makes the launcher wait. Events are kept, and the last status of the
     streams: a page that is started again is told all of them, also after the recorder has ended.
@@ -62,6 +62,7 @@ class PageHandle:
         self._left_at = -math.inf
         self._closed = threading.Event()
         self._given_up = False
+        self._served = False
         self._over = threading.Event()
         self._lock = threading.Lock()
         patience = Patience(stop_s=END_S, restarts=MOST_RESTARTS)
@@ -139,8 +140,13 @@ class PageHandle:
         self._say("the page died and is started again")
         return True
 
-    def _take(self, message: Command | Used | Opened | Closed) -> None:
-        if isinstance(message, Used):
+    def _take(self, message: Command | Served | Used | Opened | Closed) -> None:
+        if isinstance(message, Served):
+            if not self._served:
+                for page, link in self.links().items():
+                    self._say(f"{page} page: {link}")
+            self._served = True
+        elif isinstance(message, Used):
             self._order.keys.tokens.pop(message.page, None)
         elif isinstance(message, Opened):
             if self._browsers and not message.browsers:

@@ -23,7 +23,7 @@ from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
 from labcrane.web.door.access import SCOPE, SUPERVISOR, AccessKeys, Gate
 from labcrane.web.door.denials import Denials
-from labcrane.web.door.serving import AWAY_S, MOST_HEAD, build_pages
+from labcrane.web.door.serving import AWAY_S, MOST_HEAD, announcing, build_pages
 from labcrane.web.live import Live
 from labcrane.web.page import PageContext
 from labcrane.web.pictures import Pictures
@@ -72,6 +72,11 @@ class PageConfig:
     keys: AccessKeys = field(default_factory=AccessKeys)
     recorded: bool = False
     data: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Served:
+    """Said to the launcher: the pages can be opened now."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +174,7 @@ def serve(order: PageConfig, parent: Parent) -> None:
         ssl_certfile=order.certificate,
         ssl_keyfile=order.key,
     )
-    server = uvicorn.Server(config)
+    server = announcing(config, lambda: parent.tell(Served()))
     threading.Thread(target=_count, args=(denials,), daemon=True).start()
     end = partial(setattr, server, "should_exit", True)  # noqa: FBT003 - the attribute's value
     threading.Thread(target=_listen, args=(parent, view, end), daemon=True).start()

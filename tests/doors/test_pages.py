@@ -1,9 +1,7 @@
 """The pages' door: who speaks to whom, how much and how often, while the loop runs."""
 
 import asyncio
-import contextlib
 import http.client
-import socket
 import ssl
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -232,7 +230,6 @@ def attacked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Room, S
     path = folder / "study.yaml"
     path.write_text(STUDY.format(study=unique("doors"), steps=STEPS))
     with a_room(path, folder / "data") as room:
-        wait_for(lambda: opens(room.port))
         cookie = cookie_of(room, "supervisor")
         wait_for(lambda: room.process("pages"))
         told = attack(room, cookie, cookie_of(room, "participant"), 8.0, denied=21)
@@ -316,16 +313,9 @@ def test_pages_are_served_over_tls_by_the_labs_certificate(tmp_path: Path) -> No
         assert link.startswith(f"https://127.0.0.1:{room.port}/supervisor?token=")
         trusted = ssl.create_default_context(cafile=tmp_path / "authority.pem")
         to = http.client.HTTPSConnection("127.0.0.1", room.port, timeout=240, context=trusted)
-        wait_for(lambda: opens(room.port))
         to.request("GET", link.partition(str(room.port))[2])
         given = to.getresponse()
         assert given.status == 303
         words = given.getheader("set-cookie").lower().split("; ")
         assert {"secure", "httponly", "samesite=strict", "path=/"} <= set(words)
         to.close()
-
-
-def opens(port: int) -> bool:
-    with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), 1):
-        return True
-    return False

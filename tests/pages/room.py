@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import socket
 import subprocess
 import threading
 import time
@@ -59,6 +60,8 @@ class Room:
         self._reader.start()
         wait_for(lambda: len(self.links()) == 2 or self.launcher.poll() is not None)
         assert self.launcher.poll() is None, "".join(self.said)
+        with socket.create_connection(("127.0.0.1", self.port), 60):
+            pass  # a link is printed once it can be opened
 
     def _read(self) -> None:
         for line in self.launcher.stdout:

@@ -1,11 +1,15 @@
 """Serving of a page for this computer only, behind the same door, until it is interrupted."""
 
 import secrets
+import socket
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from labcrane.limits import LIMITS
 from labcrane.web.door.access import AccessKeys, Gate
+
+if TYPE_CHECKING:
+    import uvicorn
 
 HOST = "127.0.0.1"
 MOST_HEAD = 16_384
@@ -19,7 +23,7 @@ MOST_MISSED = 1000
 
 
 def serve_here(app: Any, page: str, port: int, say: Callable[[str], None]) -> None:
-    """Serve an application whose first page is ``page``; ``say`` is told its one-time link."""
+    """Serve an application whose first page is ``page``; ``say`` is then told its one-time link."""
     import uvicorn  # noqa: PLC0415 - loads for a second
 
     from labcrane.web.door.guard import BoundedProtocol, Guard  # noqa: PLC0415
@@ -37,8 +41,20 @@ def serve_here(app: Any, page: str, port: int, say: Callable[[str], None]) -> No
         ws_max_size=LIMITS["message of a page"].most,
         ws_per_message_deflate=False,
     )
-    say(f"{page}: {link}")
-    uvicorn.Server(config).run()
+    announcing(config, lambda: say(f"{page}: {link}")).run()
+
+
+def announcing(config: "uvicorn.Config", served: Callable[[], None]) -> "uvicorn.Server":
+    """Return a server that calls ``served`` once whoever opens a page is answered."""
+    import uvicorn  # noqa: PLC0415
+
+    class Announcing(uvicorn.Server):
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            if self.started:
+                served()
+
+    return Announcing(config)
 
 
 def build_pages(app: Any, missed: int = MOST_MISSED) -> None:
