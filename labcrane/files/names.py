@@ -71,6 +71,14 @@ DEVICES = frozenset(
 )
 """What no file can be called on Windows, with any ending."""
 
+MISSING = frozenset(
+    {
+        "NA", "N/A", "n/a", "NaN", "nan", "-NaN", "-nan", "NULL", "null", "None", "<NA>", "#NA",
+        "#N/A", "#N/A N/A", "-1.#IND", "1.#IND", "-1.#QNAN", "1.#QNAN",
+    }
+)  # fmt: skip
+"""Words that pandas, R or BIDS read as a missing value unless they are told otherwise."""
+
 HASHED = 8
 
 COHORT = "cohort.yaml"

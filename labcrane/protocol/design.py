@@ -3,11 +3,25 @@
 from math import comb
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PositiveInt, ValidationInfo, field_validator
+from pydantic import AfterValidator, Field, PositiveInt, ValidationInfo, field_validator
 
 from labcrane.core.settings import Settings
-from labcrane.files.model import AtMost, Usual
+from labcrane.files.model import AtMost, Usual, was_run
+from labcrane.files.names import MISSING
 from labcrane.protocol.tracks import Track
+
+
+def _is_no_missing_value(name: str, info: ValidationInfo) -> str:
+    if name in MISSING and not was_run(info):
+        raise ValueError(
+            f"{name!r} means a missing value to pandas, R or BIDS, which would leave out all that "
+            "is called so; take another name"
+        )
+    return name
+
+
+FactorName = Annotated[str, AfterValidator(_is_no_missing_value)]
+"""A name that is a value in tables: of a group, a condition, a task, a block or a session."""
 
 RULES = ("as_written", "blocked", "latin_square", "shuffled", "williams")
 """What a protocol may say under ``design: order:``; :mod:`labcrane.design.order` follows it."""
@@ -84,11 +98,11 @@ a list of names."""
 class Design(Settings):
     """What is varied, and how."""
 
-    groups: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    groups: dict[FactorName, tuple[str, ...]] = Field(default_factory=dict)
     """Between-subject groups, and the feedback that each is given: ``{none: [], visual:
     [sphere]}``. Participants are spread over them equally."""
 
-    conditions: dict[str, Switch] = Field(default_factory=dict)
+    conditions: dict[FactorName, Switch] = Field(default_factory=dict)
     """Conditions within participants, and the feedback that is on in each: ``{plain: none, tone:
     [tone]}``. Everybody has all of them. A block with ``condition: 1`` is of the participant's
     first, in the order of ``order: {condition: latin_square}``."""

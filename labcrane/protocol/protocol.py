@@ -24,7 +24,7 @@ from labcrane.analysis.scoring.settings import IndicatorSettings
 from labcrane.files.model import AtMost, was_run
 from labcrane.files.names import misfit
 from labcrane.files.yaml import YamlFile
-from labcrane.protocol.design import Design
+from labcrane.protocol.design import Design, FactorName
 from labcrane.protocol.evaluation import StopRule
 from labcrane.protocol.pages import PageSettings
 from labcrane.protocol.steps import Section, Session, read_sessions
@@ -158,7 +158,7 @@ class Protocol(Section):
     dynamics: Use
     """What moves."""
 
-    tasks: dict[str, Use] = Field(min_length=1)
+    tasks: dict[FactorName, Use] = Field(min_length=1)
     """What the operator is asked to do, by name."""
 
     questionnaires: dict[str, Use] = Field(default_factory=dict)

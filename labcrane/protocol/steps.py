@@ -22,7 +22,7 @@ from labcrane.files.names import absent, outside
 from labcrane.files.system import is_folder
 from labcrane.files.units import Unit
 from labcrane.files.yaml import Place, YamlFile, read_text
-from labcrane.protocol.design import Criterion, Switch
+from labcrane.protocol.design import Criterion, FactorName, Switch
 
 READING_S = 120.0
 """Seconds that people are likely to spend on a page of text, or questions; for plans only."""
@@ -46,7 +46,7 @@ class Block(Section):
     task: str
     """Which of the protocol's tasks."""
 
-    name: str | None = None
+    name: FactorName | None = None
     """Name of the block in the record; the task's by default."""
 
     ask: tuple[str, ...] = ()
@@ -141,7 +141,7 @@ class Step(Section):
 class Session(Section):
     """One visit of a participant."""
 
-    name: str
+    name: FactorName
     """Name of the session in the record."""
 
     after_days: tuple[NonNegativeInt, NonNegativeInt] | None = None

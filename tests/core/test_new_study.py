@@ -6,7 +6,7 @@ import pytest
 from needs import need
 
 from labcrane.cli.app import main
-from labcrane.protocol.shipped import shipped_studies
+from labcrane.cli.shipped import shipped_studies
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = ("aiming", "crane_pilot", "retrieval", "whole")
@@ -53,7 +53,7 @@ def test_recordings_and_an_approval_of_the_study_stay_where_they_are(
     (ran / "data" / "P001").mkdir(parents=True)
     for name in ("protocol.yaml", "protocol.lock.json", "protocol.lock.1.json", "consent.pdf"):
         (ran / name).write_text("study: aiming\n", encoding="utf-8")
-    monkeypatch.setattr("labcrane.protocol.shipped.shipped_studies", lambda: {"aiming": ran})
+    monkeypatch.setattr("labcrane.cli.shipped.shipped_studies", lambda: {"aiming": ran})
     assert main(["new-study", "aiming", str(tmp_path / "mine")]) == 0
     copied = {path.name for path in (tmp_path / "mine").rglob("*")}
     assert copied == {"protocol.yaml", "consent.pdf"}

@@ -136,6 +136,33 @@ def test_what_yaml_lets_people_write_by_mistake_is_told_where_it_was_written(
     assert said is None or told == [said]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("{pairs: shuffled}", "{pairs: shuffled}\n  groups: {WORD: [], other: []}", "16:12: design.groups.WORD"),
+        ("{pairs: shuffled}", "{pairs: shuffled}\n  conditions: {plain: all, WORD: none}", "16:28: design.conditions.WORD"),
+        ("- name: first", "- name: WORD", "17:11: sessions[1].name"),
+        ("{task: aiming, repeat: 2}", "{task: aiming, name: WORD}", "21:37: sessions[1].steps[3].block.name"),
+        ("aiming: {use: aiming, distances: [2, 3]}", "aiming: {use: aiming, distances: [2, 3]}\n  WORD: {use: aiming}", "14:3: tasks.WORD"),
+    ],
+)  # fmt: skip
+def test_a_name_that_tables_read_as_missing_is_refused(
+    complaint, old: str, new: str, place: str
+) -> None:
+    from pandas._libs.parsers import STR_NA_VALUES  # what pandas reads as missing by default
+
+    for word in sorted(STR_NA_VALUES - {""}):
+        told = complaint((old, new.replace("WORD", f"'{word}'")))
+        assert told[0] == (
+            f"{place.replace('WORD', word)}: {word!r} means a missing value to pandas, R or BIDS, which would leave out "
+            "all that is called so; take another name"
+        )
+    assert (
+        complaint(("{pairs: shuffled}", "{pairs: shuffled}\n  groups: {none: [], nonsense: []}"))
+        == []
+    )
+
+
 def test_a_quotation_that_takes_in_the_next_keys_is_told_where_it_opens(complaint) -> None:
     opened = ("title: A study", "title: 'A study"), ("pattern: 'P\\d{3}', ", "")
     assert complaint(*opened, ("input: {use: dual_joystick}", "input: {}'")) == [

@@ -17,7 +17,7 @@ STUDY = (
     .replace(
         "sessions:",
         """design:
-  groups: {'null': [], loud: [tone]}
+  groups: {no tone: [], loud: [tone]}
 feedback: {tone: {use: sonification}}
 questionnaires:
   about: {use: demographics, ask: [age, sex, handedness]}

@@ -40,7 +40,7 @@ def test_octave_reads_unlike_people_in_one_call(awkward: Awkward) -> None:
     measured = pd.concat(measures_of(person) for person in awkward.cohort.included)
     np.testing.assert_array_equal(np.array(said["time"], float), measured["movement_time"])
     assert said["who"] == measured["participant"].tolist()
-    assert set(said["group"]) == {"null", "loud"}
+    assert set(said["group"]) == {"no tone", "loud"}
     given = list(zip(said["who"], map(float, said["rating"]), strict=True))
     rated = {name for name, rating in given if not np.isnan(rating)}
     assert rated == set(ANSWERS) - {HALF_FINISHED}

@@ -23,7 +23,7 @@ def new_study(
     folder: Annotated[Path, typer.Argument(help="a new folder; the study takes its name")],
 ) -> None:
     """Copy a study that comes with labcrane, with everything it refers to, for you to change."""
-    from labcrane.protocol.shipped import new_study as copied
+    from labcrane.cli.shipped import new_study as copied
 
     protocol = copied(shipped, folder)
     typer.echo(f"study: {protocol}\nnext: labcrane check {folder}, and change {protocol}")
