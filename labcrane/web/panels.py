@@ -73,7 +73,7 @@ class Cameras:
         for view, cameras in self._pictures.cameras.items():
             for camera in cameras:
                 ident = f"camera-{view}-{camera}".replace(" ", "-")
-                with ui.card().classes("w-full"):
+                with ui.element("div").classes("w-full"):
                     ui.label(f"{view}: {camera}").classes("font-medium")
                     image = ui.element("img").classes("w-full")
                     image.props["id"], image.props["alt"] = ident, f"what camera {camera} shows"

@@ -11,6 +11,7 @@ import psutil
 import pytest
 from cranes import needs_bullet
 from faults.sessions import unique, wait_for
+from pages.looks import complaints
 from pages.room import STUDY, Room, a_room, photograph, press, shown, text
 from selenium import webdriver
 
@@ -47,6 +48,7 @@ VIEW = {
 LOADED = STUDY.replace("{{use: kinematic_crane}}", "{{use: bullet_crane, payload_kg: 150}}")
 STEPS = "      - instructions: wait.txt\n      - block: {task: aiming, pairs: 1}\n"
 PATIENCE_S = 120.0
+THEME = "return document.documentElement.dataset.theme"
 AGE = r"\d+\.\d s old · white 2 m, black 14 m"
 SEEN = """
 const image = document.getElementById(arguments[0]);
@@ -109,6 +111,10 @@ def test_the_supervisor_sees_cameras_and_torques(tmp_path: Path, browser: webdri
         torques = {name: text(browser, f"load-{name}") for name in ch8().names}
         wait_for(lambda: re.fullmatch(AGE, said()), PATIENCE_S)
         photograph(browser, "cameras")
+        for theme in ("dark", "light"):
+            webdriver.ActionChains(browser).send_keys("d").perform()
+            wait_for(lambda name=theme: browser.execute_script(THEME) == name)
+            assert complaints(browser) == [], theme
 
         # A view that hangs: its last picture is not taken for what is now.
         view_process(room).send_signal(signal.SIGSTOP)
