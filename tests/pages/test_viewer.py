@@ -22,6 +22,7 @@ from simple_crane import FORM
 
 from labcrane import open_recording
 from labcrane.cli.app import main
+from labcrane.core.records import Event
 from labcrane.errors import RecordingError
 from labcrane.machines.kinematics import link_frames
 from labcrane.registry.registry import discover
@@ -54,6 +55,42 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def film(file: Path) -> Film:
     return Film(open_recording(file).session(1), file.stem)
+
+
+def test_the_time_line_has_each_pause_and_loss_from_its_beginning_to_its_end(film: Film) -> None:
+    """Against each tenth of a second by itself, for random orders of losses and returns."""
+    parts = [
+        ("pause.start", "pause.end", {"by": "operator"}),
+        ("pause.start", "pause.end", {"by": "feedback main"}),
+        ("input.lost", "input.back", {}),
+        ("stream.lost", "stream.back", {"what": "eeg"}),
+        ("feedback.lost", "feedback.ready", {"what": "main"}),
+        ("feedback.lost", "feedback.ready", {"what": "tone"}),
+    ]
+    for seed in range(20):
+        draw = random.Random(seed)
+        times = sorted(draw.sample(range(1, int(10 * film.length)), 40))
+        down, happened, expected = set(), [], {}
+        for at, until in zip(times, [*times[1:], None], strict=True):
+            part = draw.randrange(len(parts))
+            begin, end, data = parts[part]
+            lost = draw.random() < 0.6  # also twice in a row, and back where nothing was lost
+            why = {"why": "it broke"} if begin.endswith("lost") else {}
+            facts = {"facts": "{}"} if end == "feedback.ready" else {}
+            named = (
+                (begin, {**data, **why, "left_out": False}) if lost else (end, {**data, **facts})
+            )
+            happened.append(Event(named[0], film.start + at / 10, named[1]))
+            down = down | {part} if lost else down - {part}
+            span = range(at, until if until is not None else int(10 * film.length))
+            expected |= {tenth: sorted(down) for tenth in span}
+        told = Film(film._record, film.called)
+        told.__dict__["_happened"] = happened
+        for tenth, parts_down in expected.items():
+            at = tenth / 10 + 0.05
+            here = [one for one in told.breaks if one["from"] <= at < one["to"]]
+            kinds = sorted("paused" if "pause" in parts[part][0] else "lost" for part in parts_down)
+            assert sorted(one["kind"] for one in here) == kinds, (seed, tenth)
 
 
 AREAS = ("main.tip", "main.target", "main.far")

@@ -57,6 +57,15 @@ GAP_S = 0.1
 
 MOST_EVENTS = 20_000
 
+BREAKS = {
+    "pause.start": ("pause.end", "by"),
+    "input.lost": ("input.back", ""),
+    "disk.lost": ("disk.back", ""),
+    "stream.lost": ("stream.back", "what"),
+    "feedback.lost": ("feedback.ready", "what"),
+}
+"""Events that begin a pause or a loss: what ends it, and which of their data says whose it is."""
+
 
 @dataclass(frozen=True, slots=True)
 class RecordedCue:
@@ -227,6 +236,32 @@ class Film:
             (float(self.time[one] - self.start), float(self.time[one + 1] - self.start))
             for one in at.tolist()
         ]
+
+    @cached_property
+    def breaks(self) -> list[dict[str, Any]]:
+        """Each pause and each loss of controls, feedback or a stream, ready for JSON.
+
+        One that has not ended lasts until the end of the session.
+        """
+        called = TableNumbers().name
+        found: list[dict[str, Any]] = []
+        lasting: dict[tuple[str, Any], dict[str, Any]] = {}
+        ends = dict(BREAKS.values())
+        for event in self._happened:
+            at = round(event.time - self.start, 4)
+            if event.name in BREAKS:
+                end, whose = BREAKS[event.name]
+                key = end, event.data.get(whose)
+                if key not in lasting:
+                    kind = "paused" if event.name == "pause.start" else "lost"
+                    text = sentence(event, called).text
+                    lasting[key] = {"from": at, "to": self.length, "kind": kind, "text": text}
+                    found.append(lasting[key])
+            elif event.name in ends:
+                key = event.name, event.data.get(ends[event.name])
+                if key in lasting:
+                    lasting.pop(key)["to"] = at
+        return found
 
     @cached_property
     def glances(self) -> Glances:

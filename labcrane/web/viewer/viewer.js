@@ -56,11 +56,13 @@ export default {
       <rect v-for="(one, n) in spans" :key="n" :class="one.kind" :x="one.x" :width="one.width" y="2" height="20"/>
       <rect v-for="(one, n) in holes" :key="'g' + n" class="view-gap" :x="one.x" :width="one.width" y="0" height="46"/>
       <path class="view-ticks" :d="ticks"/>
+      <rect v-for="(one, n) in breaks" :key="'b' + n" :class="'view-' + one.kind" :x="one.x" :width="one.width" :y="one.kind === 'lost' ? 35 : 40" height="5"><title>{{ one.text }}</title></rect>
       <rect v-for="(one, n) in marksHere" :key="'m' + n" class="view-mark" :x="one.x" :width="one.width" y="22" height="8"><title>{{ one.text }}</title></rect>
       <line class="view-now" :x1="place(t)" :x2="place(t)" y1="0" y2="46"/></svg>
     <p class="room-faint view-legend"><span class="view-swatch success"></span>success
       <span class="view-swatch other"></span>other end <span class="view-swatch approach"></span>not counted
-      <span class="view-swatch gap"></span>no frames
+      <span class="view-swatch gap"></span>no frames <span class="view-swatch paused"></span>paused
+      <span class="view-swatch lost"></span>controls, feedback or a stream lost
       <span class="view-swatch mark"></span>your marks</p>
   </section>
   <section v-if="about.gaze" class="room-card"><h2>Gaze</h2>
@@ -127,6 +129,11 @@ export default {
     },
     holes() {
       return this.about.gaps.map(([from, to]) => ({ x: this.place(from), width: Math.max(1, this.place(to) - this.place(from)) }));
+    },
+    breaks() {
+      return this.about.breaks.filter((one) => one.to >= this.begin && one.from <= this.end).map((one) => ({
+        kind: one.kind, text: one.text, x: this.place(one.from), width: Math.max(1.5, this.place(one.to) - this.place(one.from)),
+      }));
     },
     ticks() {
       return this.about.events.filter((e) => e.t >= this.begin && e.t <= this.end)

@@ -118,6 +118,7 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
         "trials": first.trials,
         "events": first.events,
         "gaps": first.gaps,
+        "breaks": first.breaks,
         "signals": first.signals,
         **marks.shown(),
         "gaze": glances.known,
