@@ -175,7 +175,7 @@ class Scene(StrictModel):
     """What is to be reached, in order; the last one ends the run."""
 
     start_deg: tuple[float, ...] | None = None
-    """Joint angles at the start, in degrees; where the machine stands, by default."""
+    """Joint angles at the start, in degrees; those of the machine at rest, by default."""
 
     limit_s: PositiveFloat = 600.0
     """Time after which the run ends, in seconds."""

@@ -1,7 +1,9 @@
 """Rehearsal: one trial of every block for every group, without people, equipment or a record.
 
 What only running finds is found before anybody sits down: the study's own plugins are built and
-called as in a session, in its order, on a clock that does not wait.
+called as in a session, in its order, on a clock that does not wait. All other trials of the planned
+participants are begun and not run: a scene is placed by the seed of its trial, and can fit for most
+of them.
 """
 
 import tempfile
@@ -14,7 +16,7 @@ from traceback import extract_tb
 
 from labcrane.core.clock import ManualClock
 from labcrane.core.records import Event, Frame, Phase, Run, Trial
-from labcrane.core.roles import Cue
+from labcrane.core.roles import Cue, Task
 from labcrane.design.plan import PlannedBlock, PlannedStep, Planner, SessionPlan, plan_session
 from labcrane.design.slots import group_of
 from labcrane.errors import LabcraneError, ProtocolError
@@ -49,6 +51,9 @@ devices, and sends."""
 
 FEWEST_TICKS = 100
 """Ticks over which the time of one is told: the first ones are slow."""
+
+MOST_BEGUN = 200
+"""Participants whose trials are begun; more of them find hardly anything more."""
 
 DRAWN = 200
 """Frames of a session that cues are given: whatever they do wrong, they do soon."""
@@ -106,9 +111,65 @@ def rehearse(study: Study) -> Rehearsed:
             for each in seen.questions:
                 if each.key not in study.protocol.expected:
                     questions.setdefault(each.key, each)
+    wrong = wrong or list(_not_begun(study))
     if wrong:
         raise ProtocolError("\n".join(dict.fromkeys(wrong)))
     return Rehearsed(sessions, trials, tuple(questions.values()))
+
+
+def _not_begun(study: Study) -> Iterator[str]:
+    """Yield which trials of the planned participants cannot begin, one of each kind, and why."""
+    for number, session in enumerate(study.protocol.sessions, start=1):
+        kinds: set[tuple[object, ...]] = set()
+        rig = Rig.build(study, simulated=True)
+        with loosely_watched((*rig.components, *rig.tasks.values())), rig.opened(study, 0):
+            for slot, name in enumerate(_planned_names(study), start=1):
+                for step, block, trial in _trials(plan_session(study, name, number, slot)):
+                    kind = (step.number, *trial.planned.condition.items())
+                    if kind in kinds:
+                        continue
+                    try:
+                        _begin(rig, rig.tasks[block.task], trial)
+                    except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
+                        kinds.add(kind)
+                        where = f"{study.where(_step(study, number, step.number))}: rehearsal"
+                        where += f", session {session.name!r}, trial {trial.number} of {name}"
+                        yield f"{where}: {_cause(error)}"
+
+
+def _trials(plan: SessionPlan) -> Iterator[tuple[PlannedStep, PlannedBlock, Trial]]:
+    for step in plan.steps:
+        if step.block is not None:
+            for trial in step.block.trials:
+                yield step, step.block, trial
+
+
+def _begin(rig: Rig, task: Task, trial: Trial) -> None:
+    """Begin a trial as a session does."""
+    for component in (*rig.components, task):
+        component.begin_trial(trial)
+    if trial.planned.start_pose is not None:
+        rig.dynamics.reset(trial.planned.start_pose)
+
+
+def _planned_names(study: Study) -> Sequence[str]:
+    about = study.protocol.participants
+    try:
+        return pseudonyms(about.pattern, min(about.planned, MOST_BEGUN))
+    except ProtocolError:  # which a check asks about
+        return ["P001"]
+
+
+def _step(study: Study, number: int, left: int) -> Place:
+    """Return where the protocol has a step, by its number in the plan; the session for 0."""
+    session: Place = ("sessions", number - 1)
+    if not left:
+        return session
+    for at, step in enumerate(study.protocol.sessions[number - 1].steps):
+        left -= step.planned
+        if left <= 0:
+            return (*session, "steps", at)
+    raise AssertionError("a plan has the steps of its session, each as often as it is written")
 
 
 def _cause(error: Exception) -> str:
@@ -157,12 +218,8 @@ def _one_of_each_group(study: Study) -> Iterator[tuple[str, int]]:
     slots: dict[str, int] = {}
     for slot in islice(count(1), max(1, len(groups))):  # each run of slots has every group once
         slots.setdefault(group_of(study.protocol.study, groups, slot), slot)
-    try:
-        name = pseudonyms(study.protocol.participants.pattern, 1)[0]
-    except ProtocolError:  # which a check asks about; whose session it is changes nothing here
-        name = "P001"
     for slot in slots.values():
-        yield name, slot
+        yield _planned_names(study)[0], slot
 
 
 def _shortened(steps: Sequence[PlannedStep]) -> Iterator[PlannedStep]:
@@ -195,8 +252,7 @@ class _Examiner:
     """Somebody who skips a trial that nobody ends, and remembers which."""
 
     def __init__(self, study: Study, plan: SessionPlan) -> None:
-        self._steps = study.protocol.sessions[plan.number - 1].steps
-        self._session = plan.number - 1
+        self._study, self._number = study, plan.number
         self._blocks = {block.number: block for block in plan.blocks}
         self._rate_hz = study.protocol.rate_hz
         self.sequencer: Sequencer | None = None
@@ -210,15 +266,7 @@ class _Examiner:
     @property
     def place(self) -> Place:
         """Where the protocol has the step that runs; the session before the first."""
-        session: Place = ("sessions", self._session)
-        left = self.sequencer.step if self.sequencer else 0
-        if not left:
-            return session
-        for at, step in enumerate(self._steps):
-            left -= step.planned
-            if left <= 0:
-                return (*session, "steps", at)
-        raise AssertionError("a plan has the steps of its session, each as often as it is written")
+        return _step(self._study, self._number, self.sequencer.step if self.sequencer else 0)
 
     def commands(self) -> list[Command]:
         if self._patience is None:

@@ -156,7 +156,7 @@ class Scenario(Task):
         return TrialStatus(phase, self._values, tuple(events), results)
 
     def _planned(self, name: str, scene: Scene) -> PlannedTrial:
-        start = None
+        start = tuple(self._machine.rest)
         if scene.start_deg is not None:
             start = tuple(math.radians(angle) for angle in scene.start_deg)
         limit = self._settings.limit_s or scene.limit_s
