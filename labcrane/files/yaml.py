@@ -248,6 +248,16 @@ def _inside(value: Any, loc: Place) -> Place:
     return tuple(place)
 
 
+DOCUMENTS = {
+    b"PK\x03\x04": "a Word or LibreOffice document, or another packed file",
+    b"\xd0\xcf\x11\xe0": "a Word document",
+    b"%PDF": "a PDF",
+}
+"""What people write texts in that is not text, by its first bytes."""
+
+AS_TEXT = "save it as plain text in UTF-8"
+
+
 def read_text(path: Path) -> str:
     """Return the text of a file in UTF-8 that people write.
 
@@ -260,7 +270,7 @@ def read_text(path: Path) -> str:
         check_size(path.stat().st_size, "YAML file", "it")
         if not path.is_file():
             raise ProtocolError(f"{path} is no file; give a YAML file")
-        return path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise ProtocolError(
             f"{path} does not exist; check its name, and the folder you are in"
@@ -269,6 +279,9 @@ def read_text(path: Path) -> str:
         raise ProtocolError(f"{path} cannot be read: {error}; split it up") from None
     except UnicodeDecodeError as error:
         raw: bytes = error.object
+        for begins, what in DOCUMENTS.items():
+            if raw.startswith(begins):
+                raise ProtocolError(f"{path} is {what}; {AS_TEXT}") from None
         if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
             raise ProtocolError(
                 f"{path}:1:1: byte 0x{raw[0]:02X} is no UTF-8; the file is in UTF-16: open it in "
@@ -281,6 +294,9 @@ def read_text(path: Path) -> str:
         ) from None
     except (OSError, ValueError) as error:  # a path with a NUL
         raise ProtocolError(f"{path} cannot be read: {error}") from error
+    if text.startswith("{\\rtf"):
+        raise ProtocolError(f"{path} is an RTF document; {AS_TEXT}")
+    return text
 
 
 def read_yaml(path: Path) -> Any:

@@ -26,6 +26,12 @@ def find_machine(name: str, beside: Path | None = None) -> Path:
         raise ProtocolError(
             f"machine file {str(path)!r} does not exist; a path counts from the protocol's folder"
         )
+    if name.endswith((".urdf", ".xml")):
+        kind = "urdf" if name.endswith(".urdf") else "mjcf"
+        raise ProtocolError(
+            f"machine is {name!r}, a robot's file; write machine: {{{kind}: {name}, joints: ..., "
+            "tip: ...}, with the study's names for its joints"
+        )
     if name in machine_names():
         return Path(str(files("labcrane") / "machines" / "data" / f"{name}.yaml"))
     there = nearest(name, machine_names(), "labcrane has")

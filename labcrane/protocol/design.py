@@ -3,9 +3,17 @@
 from math import comb
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, PositiveInt, ValidationInfo, field_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    PositiveInt,
+    ValidationInfo,
+    field_validator,
+)
 
 from labcrane.core.settings import Settings
+from labcrane.errors import meant
 from labcrane.files.model import AtMost, Usual, was_run
 from labcrane.files.names import MISSING
 from labcrane.protocol.tracks import Track
@@ -90,7 +98,20 @@ CONDITION = "condition"
 """Column of the trial table: which condition within participants a block is of; also what their
 order is called under ``design: order:``."""
 
-Switch = Literal["all", "none", "group"] | tuple[str, ...]
+SWITCHES = ("all", "none", "group")
+
+
+def _is_a_switch(said: Any) -> Any:
+    if isinstance(said, str) and said not in SWITCHES:
+        what = meant(said, SWITCHES) or (
+            "write all, none, group for what the participant's own group is given, or a list of "
+            f"names: [{said}]"
+        )
+        raise ValueError(f"it is {said!r}; {what}")
+    return said
+
+
+Switch = Annotated[Literal["all", "none", "group"] | tuple[str, ...], BeforeValidator(_is_a_switch)]
 """Which feedback is switched on: ``all``, ``none``, what the participant's ``group`` is given, or
 a list of names."""
 

@@ -224,6 +224,15 @@ def protocol_model() -> type[Protocol]:
     return create_model("Protocol", __base__=Protocol, **more) if more else Protocol
 
 
+OTHERS = {
+    "labcrane_cohort": "a cohort of simulated operators, and not a protocol",
+    "labcrane_scene": "a scene, and not a protocol",
+    "labcrane_part": "a part of a scene, and not a protocol",
+    "labcrane_dmd": "a dynamic model, and not a protocol",
+}
+"""First keys of other files that lie beside a protocol."""
+
+
 def read(path: Path, *, recorded: bool = False) -> tuple[Protocol | None, YamlFile]:
     """Read a protocol file; mistakes are noted in the file that is returned.
 
@@ -237,6 +246,9 @@ def read(path: Path, *, recorded: bool = False) -> tuple[Protocol | None, YamlFi
     source = YamlFile.read(path, recorded=recorded)
     if not isinstance(source.data, dict):
         source.problem((), "it must be a mapping of keys, beginning with 'labcrane: 1'")
+        return None, source
+    if other := next((key for key in source.data if key in OTHERS), None):
+        source.problem((other,), f"the file is {OTHERS[other]}; give the protocol", key=True)
         return None, source
     if swallowed := _swallowed(source.data):
         key, inside = swallowed

@@ -154,6 +154,15 @@ class Session(Section):
     steps: tuple[Step, ...] = Field(min_length=1)
     """What happens, in order."""
 
+    @field_validator("after_days", mode="before")
+    @classmethod
+    def _two_days(cls, days: Any) -> Any:
+        if isinstance(days, int) and not isinstance(days, bool):
+            raise ValueError(  # noqa: TRY004 - for pydantic
+                f"it is {days}; write the earliest and the latest day, as [{days}, {days}]"
+            )
+        return days
+
     @field_validator("after_days")
     @classmethod
     def _window_is_one(cls, days: tuple[int, int] | None) -> tuple[int, int] | None:
@@ -205,8 +214,7 @@ def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
     if kind == "instructions":
         return _instructions(source, place, value)
     if kind in TIMED:
-        timed = source.check(TIMED[kind], (*place, kind))
-        return {"kind": kind, **timed.model_dump()} if timed else None
+        return _timed(source, (*place, kind), value)
     if kind == "consent":
         told = "consent is a step by itself; write '- consent'"
         source.problem((*place, kind), told, key=True)
@@ -224,6 +232,16 @@ def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
         source.problem((*place, kind, key), f"{why}; drop {key}, or the track", key=True)
         return None
     return {"kind": kind, "block": block} if block else None
+
+
+def _timed(source: YamlFile, place: Place, value: Any) -> dict[str, Any] | None:
+    kind = str(place[-1])
+    if isinstance(value, (str, int, float)):
+        told = f"{kind} is {shown(value)}; write how long it lasts as {{seconds: {value}}}"
+        source.problem(place, told)
+        return None
+    timed = source.check(TIMED[kind], place)
+    return {"kind": kind, **timed.model_dump()} if timed else None
 
 
 def _no_step(source: YamlFile, place: Place, step: Any) -> None:

@@ -91,6 +91,14 @@ def test_the_protocol_of_these_tests_is_fine(complaint) -> None:
         ("task: aiming, pairs: 2", "task: aiming, feedbak: none", "20:34: 'feedbak' is no key of a block and nothing the task varies; did you mean 'feedback'? it varies pairs"),
         ("task: aiming, pairs: 2", "task: aiming, repet: 2", "20:34: 'repet' is no key of a block and nothing the task varies; did you mean 'repeat'? it varies pairs"),
         ("task: aiming, pairs: 2", "task: aiming, nmae: x", "20:34: 'nmae' is no key of a block and nothing the task varies; did you mean 'name'? it varies pairs"),
+        ("- break: {seconds: 10}", "- break: 5 min", "22:16: break is '5 min'; write how long it lasts as {seconds: 5 min}"),
+        ("- break: {seconds: 10}", "- fixation: 2", "22:19: fixation is 2; write how long it lasts as {seconds: 2}"),
+        ("- name: first", "- after_days: 1\n    name: first", "17:17: sessions[1].after_days: it is 1; write the earliest and the latest day, as [1, 1]"),
+        ("task: aiming, repeat: 2", "task: aiming, feedback: visual", "21:41: sessions[1].steps[3].block.feedback: it is 'visual'; write all, none, group for what the participant's own group is given, or a list of names: [visual]"),
+        ("machine: ch8", "machine: arm.urdf", "6:10: machine is 'arm.urdf', a robot's file; write machine: {urdf: arm.urdf, joints: ..., tip: ...}, with the study's names for its joints"),
+        ("machine: ch8", "machine: arm.xml", "6:10: machine is 'arm.xml', a robot's file; write machine: {mjcf: arm.xml, joints: ..., tip: ...}, with the study's names for its joints"),
+        ("labcrane: 1", "labcrane_cohort: 1", "1:1: the file is a cohort of simulated operators, and not a protocol; give the protocol"),
+        ("labcrane: 1", "labcrane_scene: 1", "1:1: the file is a scene, and not a protocol; give the protocol"),
         ("study: aiming", "study: Aiming Study", None),
         ("labcrane: 1", "labcrane: 2", "1:11: labcrane is 2; it must be 1"),
     ],
@@ -134,6 +142,24 @@ def test_what_yaml_lets_people_write_by_mistake_is_told_where_it_was_written(
     told = complaint((old, new))
     assert len(told) == 1
     assert said is None or told == [said]
+
+
+@pytest.mark.parametrize(
+    ("begins", "what"),
+    [
+        (b"PK\x03\x04\x14\x00\xff", "a Word or LibreOffice document, or another packed file"),
+        (b"\xd0\xcf\x11\xe0\xa1", "a Word document"),
+        (b"%PDF-1.7\n\xe2\xe3", "a PDF"),
+        (rb"{\rtf1\ansi Hello}", "an RTF document"),
+    ],
+)
+def test_instructions_that_are_no_text_are_told_what_they_are(
+    complaint, tmp_path: Path, begins: bytes, what: str
+) -> None:
+    (tmp_path / "hello.docx").write_bytes(begins)
+    assert complaint(("hello.md", "hello.docx")) == [
+        f"19:23: instructions: {tmp_path / 'hello.docx'} is {what}; save it as plain text in UTF-8"
+    ]
 
 
 @pytest.mark.parametrize(

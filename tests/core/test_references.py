@@ -87,7 +87,7 @@ def told(tmp_path: Path, registry: Registry):
         ("aiming", "width: 0.5", "width: 2", "20:57: tasks.aiming.width: a circle 2 m wide"),
         ("aiming", "[2, 3, 4, 6]", "[1,5, 2,5, 4]", "20:36: tasks.aiming.distances: 5 m is there twice; write each distance once, and decimals with a point: [1.5, 2.5, 4]"),
         ("aiming", "[2, 3, 4, 6]", "2 m", "20:36: tasks.aiming.distances is '2 m'; it must be a list: [.., ..]"),
-        ("aiming", "feedback: group", "feedback: grup", "39:41: sessions[1].steps[2].block.feedback is 'grup'; it must be 'all', 'none' or 'group', or a list: [.., ..]"),
+        ("aiming", "feedback: group", "feedback: grup", "39:41: sessions[1].steps[2].block.feedback: it is 'grup'; did you mean 'group'?"),
         ("aiming", "on_fault", "  - {name: acquisition, steps: [consent]}\non_fault", "41:12: two sessions are called 'acquisition'; give each a name of its own"),
         ("aiming", "pattern: 'P\\d{3}'", "pattern: 'P\\d{3}$1'", "7:25: participants.pattern 'P\\d{3}$1' is matched by nobody; "),
         ("aiming", "use: joint_velocity\n  map: {slew: -left.x, elbow: left.y, wrist: -right.x, shoulder: -right.y}", "use: end_effector\n  map: {x: left.x, y: left.y, up: right.y}", "14:31: scheme.map.up is 'up', and there is no such direction of the frame; it has x, y, z"),
