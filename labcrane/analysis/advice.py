@@ -79,7 +79,7 @@ def familiarity(tests: Sequence[OperatorTest], *, across: bool = False) -> Advic
     """
     about = f"environmental familiarity, {_where(tests, across=across)}"
     if len(tests) < FEWEST:
-        return Advice(tests[0].operator, about, "too few runs to say", f"{len(tests)} runs")
+        return Advice(tests[0].operator, about, "too few runs to say", _runs(len(tests)))
     unit = "of the reference" if across else "s"
     times = [test.performance.duration_s / (test.reference_s if across else 1.0) for test in tests]
     last = np.array(times[-WINDOW:])
@@ -111,7 +111,7 @@ def fatigue(tests: Sequence[OperatorTest], *, across: bool = False) -> Advice:
     percent = np.array([test.indicator.percent for test in tests])
     percent = percent[~np.isnan(percent)]
     if len(percent) < FEWEST:
-        return Advice(tests[0].operator, about, "too few runs to say", f"{len(percent)} runs")
+        return Advice(tests[0].operator, about, "too few runs to say", _runs(len(percent)))
     means = np.convolve(percent, np.ones(WINDOW) / WINDOW, mode="valid")
     best, last = float(means.max()), float(means[-1])
     tired = best - last >= FALL
@@ -149,3 +149,7 @@ def _ratings(tests: Sequence[OperatorTest]) -> str:
             else f"no {name} was rated"
         )
     return ", ".join(parts)
+
+
+def _runs(number: int) -> str:
+    return "1 run" if number == 1 else f"{number} runs"

@@ -447,6 +447,8 @@ def test_steady_times_below_the_first_show_familiarity() -> None:
     said = familiarity(runs([(90, 0), (80, 0), (70, 0), (60, 0)]))
     assert said.verdict == "still learning"
     assert familiarity(runs([(60, 0)] * 3)).verdict == "too few runs to say"
+    assert [familiarity(runs([(60, 0)] * n)).evidence for n in (1, 2)] == ["1 run", "2 runs"]
+    assert [fatigue(runs([(60, 0)] * n)).evidence for n in (1, 2)] == ["1 run", "2 runs"]
 
 
 def test_runs_that_worsen_again_suggest_another_scenario() -> None:

@@ -67,7 +67,7 @@ def _counts(words: Sequence[str]) -> str:
 def in_words(table: "pd.DataFrame") -> str:
     """Return the sample in a sentence; it says of how many an answer is known."""
     row = table.iloc[0].to_dict()
-    parts = [f"{row['n']} participants"]
+    parts = [f"{row['n']} participant{'' if row['n'] == 1 else 's'}"]
     about = []
     item = next((item for item in GENDERS if row.get(item)), "")
     if item:
