@@ -9,6 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from docs.page import ROOT
+from needs import need
 
 from labcrane.cli.app import main
 from labcrane.protocol.protocol import protocol_model
@@ -19,6 +20,7 @@ from labcrane.registry.registry import discover
 
 @pytest.fixture(scope="module")
 def generate() -> ModuleType:
+    need("pybullet")  # a page has what each part records, and a part is built for that
     spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
     assert spec
     assert spec.loader

@@ -22,7 +22,6 @@ import labcrane_dmd
 from labcrane import DeviceError, ProtocolError, RecordingError
 from labcrane.cli.app import main
 from labcrane.machines import load_machine
-from labcrane_dmd.bench.driven import arm_settings, drive
 from labcrane_dmd.bench.sources import CanValues, read_bus, read_log
 from labcrane_dmd.bench.steps import Sample, cut
 from labcrane_dmd.fit.recordings import read_recordings
@@ -46,6 +45,8 @@ BO_ 257 Encoders: 4 PANEL
 def driven(
     names: tuple[str, ...], sizes: tuple[int, ...], rate_hz: float = RATE_HZ, path: Path = MODEL
 ):
+    from labcrane_dmd.bench.driven import arm_settings, drive
+
     model = labcrane_dmd.load(path)
     settings = model.settings.model_copy(update={"validation": sizes})
     model = replace(model, segments={name: model[name] for name in names}, settings=settings)
@@ -167,6 +168,8 @@ def test_the_command_drives_the_arm_and_leaves_the_papers_tables(
 
 @needs_bullet
 def test_a_machine_without_the_models_segments_is_refused() -> None:
+    from labcrane_dmd.bench.driven import arm_settings, drive
+
     model = labcrane_dmd.load(MODEL)
     ch8 = load_machine("ch8")
     with pytest.raises(ProtocolError, match=r"no joint 'arm', 'boom', 'jaws', which the model"):

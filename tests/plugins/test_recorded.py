@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cranes import needs_mujoco
 from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
 
 from labcrane import InputDevice, ProtocolError, open_recording
@@ -13,13 +14,15 @@ from labcrane.testing import InputContract, ch8
 from labcrane_operator import labcrane_inputs
 from labcrane_operator.recorded import RecordedSettings
 
-BULLET = SHORT.replace("kinematic_crane", "bullet_crane")
+ENGINED = SHORT.replace("kinematic_crane", "mujoco_crane")
+
+pytestmark = needs_mujoco
 
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("recorded")
-    visit = Visit(a_study(folder, BULLET), "P001", 1, folder / "data", simulated=True, fast=True)
+    visit = Visit(a_study(folder, ENGINED), "P001", 1, folder / "data", simulated=True, fast=True)
     return run(visit, ScriptedConsole())
 
 
@@ -31,7 +34,7 @@ class TestContract(InputContract):
 
 
 def test_the_same_axes_move_the_machine_the_same_way(recording: Path, tmp_path: Path) -> None:
-    text = BULLET.replace("{use: dual_joystick}", f"{{use: recorded, file: {recording}}}")
+    text = ENGINED.replace("{use: dual_joystick}", f"{{use: recorded, file: {recording}}}")
     study = a_study(tmp_path, text)
     seen = rehearse(study, rig=Rig.build(study, simulated=False))
     state = open_recording(recording).session(1).streams["state"].data.to_numpy()
@@ -39,7 +42,7 @@ def test_the_same_axes_move_the_machine_the_same_way(recording: Path, tmp_path: 
 
 
 def test_a_recording_that_ends_early_is_lost_input(recording: Path, tmp_path: Path) -> None:
-    text = BULLET.replace("{use: dual_joystick}", f"{{use: recorded, file: {recording}}}")
+    text = ENGINED.replace("{use: dual_joystick}", f"{{use: recorded, file: {recording}}}")
     study = a_study(
         tmp_path, text.replace("pairs: 1", "pairs: 2") + "on_fault: {input_lost: end}\n"
     )
@@ -49,7 +52,7 @@ def test_a_recording_that_ends_early_is_lost_input(recording: Path, tmp_path: Pa
 
 
 def test_a_recording_of_another_rate_is_refused(recording: Path, tmp_path: Path) -> None:
-    text = BULLET.replace("{use: dual_joystick}", f"{{use: recorded, file: {recording}}}")
+    text = ENGINED.replace("{use: dual_joystick}", f"{{use: recorded, file: {recording}}}")
     study = a_study(tmp_path, text.replace("rate_hz: 240", "rate_hz: 250"))
     with pytest.raises(ProtocolError, match="recorded at 240 Hz and cannot be played at 250 Hz"):
         rehearse(study, rig=Rig.build(study, simulated=False))
