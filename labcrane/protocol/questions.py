@@ -888,12 +888,24 @@ def _of_limits(study: Study) -> Doubts:
             yield ("sync", key), f"sync.{key} fails beyond {fail:g}, and is a share of 1"
 
 
+TYPES = ("Audio", "ECG", "EDA", "EEG", "EMG", "Gaze", "GSR", "Markers", "MoCap", "NIRS", "PPG")
+"""Types of streams as devices usually write them."""
+
+
 def _of_streams(study: Study) -> Doubts:
+    usual = {each.lower(): each for each in TYPES}
     first: dict[tuple[str | None, ...], str] = {}
     for label, need in study.protocol.streams.items():
         of = (need.type, need.name, need.source_id)
         if "" in of:
             yield ("streams", label), f"streams: {label} is asked for by an empty text"
+        written = usual.get((need.type or "").lower(), need.type)
+        if written != need.type:
+            yield (
+                ("streams", label, "type"),
+                f"streams: {label} is of type {need.type!r}; LSL compares types letter by letter, "
+                f"and devices write {written!r}",
+            )
         if (other := first.setdefault(of, label)) != label:
             yield ("streams", label), f"streams: {other} and {label} are the same"
         if need.latency_s is not None and abs(need.latency_s) > LONGEST_LATENCY_S:

@@ -173,6 +173,8 @@ UNLIKE = [
          "design.groups", "a group has no name"),
         ([("  use: joint_velocity\n", "  use: joint_velocity\n  soft_stop_deg: 170\n")], "scheme.soft_stop_deg", "a joint turns by 172 in all"),
         ([("sessions:", "streams: {a: {source_id: x}, b: {source_id: x}}\nsessions:")], "streams.b", "a and b are the same"),
+        ([("sessions:", "streams: {a: {name: A, type: eeg}}\nsessions:")], "streams.a.type", "letter by letter, and devices write 'EEG'"),
+        ([("sessions:", "streams: {a: {name: A, type: mocap}}\nsessions:")], "streams.a.type", "devices write 'MoCap'"),
         ([("sessions:", "streams: {a: {name: ''}}\nsessions:")], "streams.a", "by an empty text"),
         ([("sessions:", "views: {front: {use: view, hint_s: 1 ms}}\nsessions:")], "views.front.hint_s", "nobody reads"),
         ([("sessions:", "views: {front: {use: view, patch: {size: 5000}}}\nsessions:")], "views.front.patch.size", "is 5000 pixels, and 720"),
