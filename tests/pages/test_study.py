@@ -1,5 +1,6 @@
 """The study's page: who is due, how good every session is, and the way to viewer and report."""
 
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -121,6 +122,19 @@ def test_groups_are_counted_by_their_slots(lab: Lab) -> None:
     assert replace(found, groups=even).balanced
     assert not replace(found, groups=even | {"b": (3, 0)}).balanced
     assert replace(found, groups={}).balanced
+
+
+@pytest.mark.slow
+def test_the_page_says_whom_it_does_not_count_and_how_many_days_are_left(lab: Lab) -> None:
+    sat_on(lab, TODAY)
+    for days, words in ((5, "in 2 days"), (6, "in 1 day"), (8, "1 day left"), (11, "since 2 days")):
+        day = TODAY + timedelta(days)
+        assert re.search(rf" · {words}\b", page_of(overview(lab, day), day, "now"))
+    found = overview(lab)
+    assert "not counted" not in page_of(found, TODAY, "now")
+    people = tuple(replace(one, status="simulated") for one in found.people)
+    page = page_of(replace(found, people=people), TODAY, "now")
+    assert f"participants; {len(people)} simulated or pilot, not counted" in page
 
 
 @pytest.mark.slow

@@ -1,7 +1,7 @@
 """Study's page in HTML: the whole study at a glance, and a link to everything behind it."""
 
 from collections.abc import Iterator
-from datetime import date
+from datetime import date, timedelta
 from pathlib import Path
 
 from labcrane.files.html import rendered
@@ -63,7 +63,9 @@ def _figures(overview: Overview) -> Iterator[tuple[str, str, str, str]]:
     overdue = sum(due.state == "overdue" for _, due in overview.due)
     lasts = "" if overview.lasts is None else f", enough for {overview.lasts:,} sessions like these"
     full = overview.lasts is not None and overview.lasts < FEW
-    yield "complete", f"{complete} of {len(real)}", "participants", ""
+    others = len(overview.people) - len(real)
+    beside = f"; {others} simulated or pilot, not counted" if others else ""
+    yield "complete", f"{complete} of {len(real)}", f"participants{beside}", ""
     yield "due", str(len(overview.due)), f"{overdue} overdue", "warn" if overdue else ""
     yield "sessions", str(sessions), f"{doubtful} to look at", "warn" if doubtful else ""
     yield "disk", size(overview.used), f"{size(overview.free)} free{lasts}", "bad" if full else ""
@@ -84,10 +86,14 @@ def _left(due: Due, today: date) -> str:
     if due.last is None:
         return ""
     if due.first is not None and today < due.first:
-        return f" · in {(due.first - today).days} days"
+        return f" · in {_days(due.first - today)}"
     if today <= due.last:
-        return f" · {(due.last - today).days} days left"
-    return f" · since {(today - due.last).days} days"
+        return f" · {_days(due.last - today)} left"
+    return f" · since {_days(today - due.last)}"
+
+
+def _days(span: timedelta) -> str:
+    return "1 day" if span.days == 1 else f"{span.days} days"
 
 
 def _in_words(one: Deviation) -> str:
