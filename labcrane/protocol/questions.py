@@ -189,6 +189,7 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_what_is_not_asked(study)
     yield from _of_orders_of_steps(study)
     yield from _of_fading(study)
+    yield from _of_answers(study)
     yield from _of_streams(study)
     yield from _of_gaze(study)
     yield from _of_pulses(study)
@@ -876,6 +877,27 @@ def _of_fading(study: Study) -> Doubts:
             yield at, "the feedback fades, and there is none"
         elif count < len(block.fading):
             yield at, f"the feedback fades in {len(block.fading)} parts, over {count:.0f} trials"
+
+
+MOST_ANSWERS = 300
+"""Answers after the trials of one step that nobody is asked about."""
+
+
+def _of_answers(study: Study) -> Doubts:
+    """Question blocks whose questionnaires after each trial ask for very many answers."""
+    for place, block in _blocks(study):
+        kind = study.protocol.sessions[int(place[1])].steps[int(place[3])].kind
+        task = study.tasks[block.task]
+        planned = task.plan(task.factors())
+        counted = sum(trial.counted for trial in planned) / max(1, len(planned))
+        trials = trials_of(block, study.protocol, task)[0] * counted
+        each = sum(len(study.questionnaires[name].items()) for name in block.ask)
+        if each * trials > MOST_ANSWERS:
+            yield (
+                (*place, kind, "ask"),
+                f"{each} answers after each of {trials:.0f} trials are {each * trials:,.0f} in "
+                "all; ask once, in a step of its own, or ask less",
+            )
 
 
 def _of_limits(study: Study) -> Doubts:

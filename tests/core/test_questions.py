@@ -75,6 +75,9 @@ UNLIKE = [
         ([("sessions:", "design: {order: {pairs: {rule: shuffled, times: 2}}}\nsessions:"), ("pairs: 1", "pairs: 2")],
          "sessions.1.steps.1.block.pairs", "takes 2 of the 2 pairs"),
         ([("sessions:", "design: {order: {pairs: latin_square}}\nsessions:")], "sessions.1.steps.1.block.pairs", "whose order is latin_square"),
+        # NASA-TLX has six answers; a repetition of this block has two trials, and an approach that is not counted.
+        ([(BLOCK, BLOCK.replace("}", ", repeat: 26, ask: [nasa_tlx]}"))], "sessions.1.steps.1.block.ask",
+         "6 answers after each of 52 trials are 312 in all; ask once, in a step of its own, or ask less"),
         ([(BLOCK, BLOCK.replace("block", "practice"))], "sessions", "no session has a block, only practice, which counts for nothing"),
         ([(BLOCK, BLOCK.replace("block", "reference"))], "sessions", "no session has a block, only reference, which"),
         ([(BLOCK, "      - questionnaire: nasa_tlx\n")], "sessions", "no session has a block, so that a report has no result; write block"),
@@ -210,6 +213,11 @@ def test_a_number_that_nobody_means_is_asked_about_until_it_is_answered(
     assert asked[key].endswith("is that meant?")
     answer = ("sessions:", f"expected: [{', '.join(asked)}]\nsessions:")
     assert questions(a_study(tmp_path, *changes, answer)) == ()
+
+
+def test_300_answers_after_the_trials_of_a_step_are_not_asked_about(tmp_path: Path) -> None:
+    changes = (BLOCK, BLOCK.replace("}", ", repeat: 25, ask: [nasa_tlx]}"))
+    assert questions(a_study(tmp_path, changes)) == ()
 
 
 def test_schemes_that_are_alike_fast_by_default_are_not_asked_about(tmp_path: Path) -> None:
