@@ -120,21 +120,38 @@ def rehearse(study: Study) -> Rehearsed:
 def _not_begun(study: Study) -> Iterator[str]:
     """Yield which trials of the planned participants cannot begin, one of each kind, and why."""
     for number, session in enumerate(study.protocol.sessions, start=1):
-        kinds: set[tuple[object, ...]] = set()
+        kinds: set[tuple[int, str]] = set()
         rig = Rig.build(study, simulated=True)
         with loosely_watched((*rig.components, *rig.tasks.values())), rig.opened(study, 0):
             for slot, name in enumerate(_planned_names(study), start=1):
-                for step, block, trial in _trials(plan_session(study, name, number, slot)):
-                    kind = (step.number, *trial.planned.condition.items())
-                    if kind in kinds:
-                        continue
-                    try:
-                        _begin(rig, rig.tasks[block.task], trial)
-                    except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
-                        kinds.add(kind)
-                        where = f"{study.where(_step(study, number, step.number))}: rehearsal"
-                        where += f", session {session.name!r}, trial {trial.number} of {name}"
-                        yield f"{where}: {_cause(error)}"
+                where = f"rehearsal, session {session.name!r}"
+                try:
+                    plan = plan_session(study, name, number, slot)
+                except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
+                    at = study.where(_unplanned(study, name, number, slot))
+                    yield f"{at}: {where} of {name}: {_cause(error)}"
+                    break
+                for at, trial, why in _stuck(study, rig, plan, kinds):
+                    yield f"{at}: {where}, trial {trial} of {name}: {why}"
+
+
+def _stuck(
+    study: Study, rig: Rig, plan: SessionPlan, kinds: set[tuple[int, str]]
+) -> Iterator[tuple[str, int, str]]:
+    """Yield where trials of a plan are written that cannot begin, their numbers, and why.
+
+    Trials of the same step and condition as one of ``kinds`` are left out; those found are added.
+    """
+    for step, block, trial in _trials(plan):
+        kind = step.number, repr(trial.planned.condition)
+        if kind in kinds:
+            continue
+        try:
+            _begin(rig, rig.tasks[block.task], trial)
+        except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
+            kinds.add(kind)
+            at = study.where(_step(study, plan.number, step.number))
+            yield at, trial.number, _cause(error)
 
 
 def _trials(plan: SessionPlan) -> Iterator[tuple[PlannedStep, PlannedBlock, Trial]]:
