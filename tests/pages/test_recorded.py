@@ -2,7 +2,6 @@
 
 import http.client
 import random
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -39,18 +38,11 @@ def test_pages_show_a_session_whose_protocol_would_be_refused_today(tmp_path: Pa
     port = free_port(HOST, 0)
     order = PageConfig(path, "P001", "P001", 1, unique("old"), HOST, port, recorded=True)
     pages = PageHandle(order, lambda _: None, said.append, dict)
-    found: list[tuple[int, str, str]] = []
-
-    def served() -> bool:
-        with suppress(ConnectionRefusedError):  # it loads for a second
-            link = pages.links()["supervisor"]
-            found.append(answer(port, link.partition(str(port))[2]))
-        return bool(found or said)
-
+    link = pages.links()["supervisor"]
     try:
-        wait_for(served)
-        assert not said
-        [(status, cookie, _)] = found
+        wait_for(lambda: len(said) >= len(pages.links()))
+        assert said == [f"{page} page: {each}" for page, each in pages.links().items()]
+        status, cookie, _ = answer(port, link.partition(str(port))[2])
         assert status == 303
         status, _, shown = answer(port, "/supervisor", cookie.partition(";")[0])
         assert status == 200
