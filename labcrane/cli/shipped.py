@@ -13,7 +13,7 @@ FOLDERS = ("protocols", "labcrane_studies")
 """Where they are beside the package: in the repository, and in what a wheel installs."""
 
 LEFT = shutil.ignore_patterns("data", "*.lock*.json")
-"""What somebody who ran a study where it is left there: recordings, and its approval."""
+"""Recordings and the approval of a study that was run where it is; they are not copied."""
 
 
 def shipped_studies() -> dict[str, Path]:
@@ -41,7 +41,7 @@ def new_study(shipped: str, folder: Path) -> Path:
     Raises
     ------
     ProtocolError
-        There is no such study, or no study can be made there.
+        No study has that name, the folder's name cannot name a study, or the folder exists.
     """
     known = shipped_studies()
     if shipped not in known:

@@ -53,7 +53,7 @@ FEWEST_TICKS = 100
 """Ticks over which the time of one is told: the first ones are slow."""
 
 MOST_BEGUN = 200
-"""Participants whose trials are begun; more of them find hardly anything more."""
+"""Most participants whose trials are begun; more would take long and find little."""
 
 DRAWN = 200
 """Frames of a session that cues are given: whatever they do wrong, they do soon."""

@@ -45,7 +45,7 @@ def serve_here(app: Any, page: str, port: int, say: Callable[[str], None]) -> No
 
 
 def announcing(config: "uvicorn.Config", served: Callable[[], None]) -> "uvicorn.Server":
-    """Return a server that calls ``served`` once whoever opens a page is answered."""
+    """Return a server that calls ``served`` as soon as pages can be opened."""
     import uvicorn  # noqa: PLC0415
 
     class Announcing(uvicorn.Server):
