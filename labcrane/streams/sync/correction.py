@@ -150,18 +150,19 @@ def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> C
     if not told.all():
         return _some_untold(raw, treatment, end, told)
     of = repeats.first_of(raw.stamps, treatment.rate_hz) if treatment.rate_hz > 0.0 else None
-    if of is None or (not len(raw.arrivals) and _went_back(raw.stamps)):
+    shown = len(raw.arrivals) > 0 or raw.sent_again or raw.index is not None
+    if of is None or (not shown and _went_back(raw.stamps)):
         return _on_our_clock(raw, treatment, end)
     own = of == np.arange(len(of))
     found = _on_our_clock(repeats.left_out(raw, own), treatment, end)
     where = repeats.place_of(of)
-    return Corrected(
-        found.time[where],
-        found.error[where],
-        found.uneven[where],
-        repeats.put_back(found.segments, own),
-        replace(found.quality, repeated=int(np.count_nonzero(~own))),
-    )
+    time, error, uneven = found.time[where], found.error[where], found.uneven[where]
+    again = int(np.count_nonzero(~own))
+    quality = replace(found.quality, repeated=again)
+    if not shown:  # or its clock was set back, and no sample before or after that is sent again
+        error = error + repeats.back_s(raw.stamps)
+        quality = replace(found.quality, backward=again, **_errors(time, error, uneven))
+    return Corrected(time, error, uneven, repeats.put_back(found.segments, own), quality)
 
 
 def _went_back(stamps: FloatArray) -> bool:
@@ -366,7 +367,7 @@ def _summed(
         frozen=_frozen(placed, sampled),
         ahead_s=placed.ahead_s,
         **_trips(raw),
-        backward=_backward(time) if regular else 0,
+        backward=_backward(time) if regular else sum(one.behind for _, one, _ in sampled),
         **_errors(time, error, placed.time),
         **_flow(placed, sampled, regular=regular),
     )

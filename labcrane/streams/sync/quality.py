@@ -112,7 +112,8 @@ class Quality:
     repeated
         Samples of regular streams that were sent again, with the stamp that they had.
     backward
-        Samples of regular streams that are placed before one that came earlier.
+        Samples that are placed before one that came earlier, or where it is, and may be late
+        ones or of a clock that was set back.
     ahead_s
         By how much irregular samples came before they happened, by their stamps; 0 if none did.
     """

@@ -1,6 +1,6 @@
 """A stream as it was received, before anything is made of its time stamps."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -52,6 +52,8 @@ class RawStream:
     own_probes
         Those that its own program answered, where ``probes`` are all of its computer's, shape
         ``(n_own, 4)``; else None.
+    sent_again
+        Whether samples that have the stamp of an earlier one are known to have its values too.
     """
 
     stamps: FloatArray
@@ -62,6 +64,7 @@ class RawStream:
     own: FloatArray = field(default_factory=lambda: _nothing(2))
     steady: FloatArray = field(default_factory=lambda: np.empty(0))
     own_probes: FloatArray | None = None
+    sent_again: bool = False
 
     def __post_init__(self) -> None:
         for name, columns in (("probes", 4), ("arrivals", 2), ("resets", 3), ("own", 2)):
@@ -140,13 +143,28 @@ def raw_of(recorded: RecordedStream) -> RawStream:
         when, offset = recorded.offsets.T
         trips = np.full(len(when), ASSUMED_RTT_S)
         probes = np.column_stack([when - POLL_AGE_S, offset, trips, when + offset])
-    return RawStream.of(
+    raw = RawStream.of(
         recorded.time_raw,
         probes=probes,
         arrivals=recorded.arrivals,
         resets=_resets(recorded),
         own=recorded.own_clock[:, :2],
     )
+    return replace(raw, sent_again=_same_values(recorded))
+
+
+def _same_values(recorded: RecordedStream) -> bool:
+    """Whether samples with the stamp of an earlier one have its values, and values change."""
+    stamps, data = recorded.time_raw, recorded.data
+    if len(data) != len(stamps):
+        return False
+    _, first, which = np.unique(stamps, return_index=True, return_inverse=True)
+    again = np.flatnonzero(first[which] != np.arange(len(stamps)))
+    if not len(again):
+        return False
+    values, earlier = data[again], data[first[which[again]]]
+    alike = (values == earlier) | ((values != values) & (earlier != earlier))  # noqa: PLR0124
+    return bool(alike.all() and (values[1:] != values[:-1]).any())
 
 
 def _resets(recorded: RecordedStream) -> FloatArray:

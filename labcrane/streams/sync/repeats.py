@@ -66,6 +66,13 @@ def _period(stamps: FloatArray, rising: npt.NDArray[np.bool_], nominal: float) -
     return min(known, key=lambda one: abs(np.log(max(one, 1e-9) / nominal)))
 
 
+def back_s(stamps: FloatArray) -> float:
+    """Return by how much stamps of a regular stream went back, all steps added up."""
+    steps = np.diff(stamps)
+    usual = float(np.median(steps[steps > 0.0]))
+    return float(np.sum(usual - steps[steps < 0.0]))
+
+
 def left_out(raw: RawStream, own: npt.NDArray[np.bool_]) -> RawStream:
     """Return the stream of these samples alone."""
     before = np.r_[0, np.cumsum(own)]

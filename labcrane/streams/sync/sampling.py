@@ -104,7 +104,10 @@ class Sampling:
     kept_s
         By how much stamps scatter, as arrivals show, that could not be evened.
     back_s
-        By how much stamps go back, in sum, further than any buffer shrinks.
+        By how much stamps go back, in sum, further than any buffer shrinks; of irregular streams
+        without arrivals, by how much their clock may have been set back.
+    behind
+        Samples of those that lie behind an earlier one.
     """
 
     period: float = np.nan
@@ -129,6 +132,7 @@ class Sampling:
     breaks: npt.NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     back_s: float = 0.0
     kept_s: float = 0.0
+    behind: int = 0
 
     @property
     def rate_hz(self) -> float:
@@ -247,14 +251,31 @@ def examine_irregular(
     parts = np.round(np.diff(stamps) / grid) if grid else np.zeros(0)
     cut = np.count_nonzero(parts != np.median(parts)) >= SEVERAL if grid else False
     stalls, longest = _stalls(time, arrival, alone=False)
+    back = 0.0 if arrival is not None else _set_back(time)
     return Sampling(
         missing=int(np.maximum(np.diff(index) - 1.0, 0.0).sum()),
-        disordered=int(np.count_nonzero(behind)),
+        disordered=0 if back else int(np.count_nonzero(behind)),
+        behind=int(np.count_nonzero(behind)) if back else 0,
+        back_s=back,
         grid_s=grid if cut else 0.0,
         stalls=stalls,
         longest_stall_s=longest,
         index=index,
     )
+
+
+def _set_back(time: FloatArray) -> float:
+    """Return by how much a clock may have been set back, of samples that may come at any time.
+
+    A sample behind an earlier one was sent late, or the clock was set back: by what is seen, and by
+    the time since the sample before. Programs that send late do so again and again.
+    """
+    steps = np.diff(time)
+    back = steps < -BEHIND_S
+    if not 0 < np.count_nonzero(back) <= SEVERAL:
+        return 0.0
+    usual = float(np.quantile(steps[~back], 0.95)) if not back.all() else 0.0
+    return float(np.sum(usual - steps[back]))
 
 
 @dataclass(frozen=True, slots=True)

@@ -250,8 +250,8 @@ def _order(quality: Quality) -> list[Finding]:
     """Judge whether samples come one after the other."""
     found: list[Finding] = []
     if quality.backward and not quality.disordered:
-        text = f"{quality.backward} samples are placed before one that came earlier: its buffer "
-        text += "changed, or its clock went back"
+        text = f"{quality.backward} samples are placed before one that came earlier: sent late or "
+        text += "again, its buffer changed, or its clock was set back"
         _add(found, Verdict.WARN, text, "leave out the trials they are in; look at its program")
     if quality.disordered:
         text = f"{quality.disordered} samples came out of order"
