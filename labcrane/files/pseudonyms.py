@@ -28,8 +28,8 @@ def pseudonyms(pattern: str, count: int) -> list[str]:
     if count == 1 and _fits(pattern, pattern):
         return [pattern]  # of one person
     raise ProtocolError(
-        f"no {count} names of letters and a number match the pattern {pattern!r}; "
-        "name participants with --participant"
+        f"no {count} names of letters and a number match participants.pattern {pattern!r}; take "
+        "letters and then a number, as in 'P[0-9]{3}'"
     )
 
 

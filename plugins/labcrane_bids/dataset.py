@@ -11,6 +11,7 @@ from labcrane import ProtocolError
 from labcrane.core import read_csv_text
 from labcrane.recording import HED_VERSION
 from labcrane_bids.files import MISSING, label, write_json, write_tsv
+from labcrane_bids.phenotype import age_code
 from labcrane_bids.settings import BidsSettings
 
 BIDS_VERSION = "1.11.1"
@@ -142,7 +143,17 @@ def _people(reader: "csv.DictReader[str]", path: Path) -> dict[str, dict[str, st
                 f"{path}, line {reader.line_num}: {name!r} is there twice; keep one row"
             )
         people[name] = {name: cell for name, cell in row.items() if cell}
+        if "age" in people[name]:
+            people[name]["age"] = _age(people[name]["age"])
     return people
+
+
+def _age(cell: str) -> str:
+    """Return an age as BIDS writes it; words stay as they are."""
+    try:
+        return age_code(float(cell))
+    except ValueError:
+        return cell
 
 
 def copy_phenotype(source: Path | None, folder: Path, recorded: Sequence[str] = ()) -> None:

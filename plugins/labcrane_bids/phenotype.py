@@ -4,8 +4,9 @@ BIDS 1.11 allows one row per participant in ``phenotype``. A questionnaire that 
 more often is in ``beh`` instead: one table per session, one row for each time, with its trial.
 """
 
+import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,9 @@ OLDEST = 89
 
 KEYS = ["session", "step", "block", "trial"]
 
+ITEM, SCORE = "item_", "score_"
+"""How the columns of items that are called as other columns begin, and those of scores."""
+
 COLUMNS: Mapping[str, Mapping[str, str]] = {
     "session_id": {"Description": "session in which it was asked"},
     "block": {"Description": "block under way or before it; 0 before the first"},
@@ -36,19 +40,32 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
 
 
 class Phenotype:
-    """Answers and scores of all participants, one row for each time that they were asked."""
+    """Answers and scores of all participants, one row for each time that they were asked.
+
+    The column of an item is called as the item; one that is called as another column, or begins as
+    they do, has ``item_`` before it: ``item_trial``.
+    """
 
     def __init__(self) -> None:
         self._rows: dict[str, list[dict[str, Any]]] = {}
         self._about: dict[str, Mapping[str, Any]] = {}
+        self._forms: dict[tuple[str, str], dict[str, list[str]]] = {}
+        self._about_person: set[str] = set()
 
     def add(self, subject: str, participant: Participant, answers: "pd.DataFrame") -> None:
         """Take up one participant's answers and scores."""
-        for _, session in participant.sessions():
-            self._about |= asked_in(session)
+        for number, session in participant.sessions():
+            for name, about in asked_in(session).items():
+                self._about[name] = _with_earlier(self._about.get(name, {}), about)
+                for item in about["items"]:
+                    forms = self._forms.setdefault((name, item["name"]), {})
+                    form = json.dumps(_item(item), ensure_ascii=False)
+                    forms.setdefault(form, []).append(f"{subject}_ses-{number:02}")
         scores = scores_of(participant)
         for name in dict.fromkeys(answers["questionnaire"]):
             own = answers[answers["questionnaire"] == name]
+            if _asks_about_person(own["version"].iloc[0]):
+                self._about_person.add(str(name))
             worth = scores[scores["questionnaire"] == name]
             for _, times in own.groupby(KEYS, dropna=False, sort=False):
                 row = _row(subject, times)
@@ -58,7 +75,8 @@ class Phenotype:
         """Write the tables; return what they would be called in ``phenotype``."""
         import pandas as pd
 
-        tasks = _tasks(self._rows)
+        tasks = _all_different(self._rows, label)
+        tables = _all_different(self._rows, label_of)
         for name, rows in self._rows.items():
             table = pd.DataFrame(rows)
             for column in ("block", "trial"):
@@ -69,25 +87,30 @@ class Phenotype:
                 _write_repeated(folder, f"task-{tasks[name]}_beh", table, about)
                 continue
             (folder / PHENOTYPE).mkdir(exist_ok=True)
-            write_tsv(folder / PHENOTYPE / f"{label_of(name)}.tsv", table)
+            write_tsv(folder / PHENOTYPE / f"{tables[name]}.tsv", table)
             about = {"MeasurementToolMetadata": {"Description": self._title(name)}, **about}
-            write_json(folder / PHENOTYPE / f"{label_of(name)}.json", about)
-        return [label_of(name) for name in self._rows]
+            write_json(folder / PHENOTYPE / f"{tables[name]}.json", about)
+        return list(tables.values())
 
     def _title(self, name: str) -> str:
         return str(self._about.get(name, {}).get("title") or name)
 
     def _described(self, name: str, columns: Sequence[str]) -> dict[str, Any]:
         about = self._about.get(name, {})
-        items = {item["name"]: _item(item) for item in about.get("items", ())}
+        items = {
+            _column(item["name"]): _of_forms(self._forms[name, item["name"]])
+            for item in about.get("items", ())
+        }
         scores = {
-            f"score_{score['name']}": {
+            f"{SCORE}{score['name']}": {
                 "Description": f"score {score['name']}",
                 "Minimum": score["lowest"],
                 "Maximum": score["highest"],
             }
             for score in about.get("scores", ())
         }
+        if name in self._about_person and "age" in items:
+            items["age"]["Description"] += f"; {OLDEST}+ for {OLDEST} and above"
         known = {**COLUMNS, **items, **scores}
         return {
             column: dict(known.get(column, {"Description": column.replace("_", " ")}))
@@ -113,15 +136,55 @@ def _write_repeated(
     write_json(folder / f"{stem}.json", {k: v for k, v in about.items() if k != "session_id"})
 
 
-def _tasks(names: Iterable[str]) -> dict[str, str]:
-    """Return what each questionnaire is called in the name of a file, all different."""
-    tasks: dict[str, str] = {}
+def _all_different(names: Iterable[str], called: Callable[[str], str]) -> dict[str, str]:
+    """Return what each questionnaire is called in the name of a file, upper and lower case apart.
+
+    BIDS takes letters and digits alone, so that ``mood-1`` and ``mood1`` would be one file.
+    """
+    files: dict[str, str] = {}
     for name in names:
-        task = label(name)
-        while task in tasks.values():
-            task += "x"
-        tasks[name] = task
-    return tasks
+        file = called(name) or "questionnaire"
+        while file.lower() in map(str.lower, files.values()):
+            file += "x"
+        files[name] = file
+    return files
+
+
+def _column(item: str) -> str:
+    """Return what the column of an item is called, which no other column is."""
+    other = item in COLUMNS or item == "participant_id" or item.startswith((ITEM, SCORE))
+    return f"{ITEM}{item}" if other else item
+
+
+def _with_earlier(earlier: Mapping[str, Any], about: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return what is known of a questionnaire, with items and scores that it had before."""
+    merged = {
+        key: list({each["name"]: each for each in (*earlier.get(key, ()), *about[key])}.values())
+        for key in ("items", "scores")
+    }
+    return {**about, **merged}
+
+
+def _of_forms(forms: Mapping[str, Sequence[str]]) -> dict[str, Any]:
+    """Return the description of an item; where an amendment changed it, who was asked what."""
+    described = [(json.loads(form), asked) for form, asked in forms.items()]
+    if len(described) == 1:
+        return dict(described[0][0])
+    levels = {}
+    if all("Levels" in about for about, _ in described):  # numbers are no level of any
+        levels = {key: word for about, _ in described for key, word in about["Levels"].items()}
+    said = "; ".join(f"of {', '.join(asked)}: {_in_words(about)}" for about, asked in described)
+    return {"Description": f"asked in {len(described)} forms; {said}"} | (
+        {"Levels": levels} if levels else {}
+    )
+
+
+def _in_words(about: Mapping[str, Any]) -> str:
+    if "Levels" in about:
+        return f"{about['Description']} [{', '.join(about['Levels'])}]"
+    if "Minimum" in about:
+        return f"{about['Description']} [{about['Minimum']:g} to {about['Maximum']:g}]"
+    return f"{about['Description']} [words]"
 
 
 def demographics_of(answers: "pd.DataFrame") -> dict[str, str]:
@@ -131,17 +194,22 @@ def demographics_of(answers: "pd.DataFrame") -> dict[str, str]:
         item, value = row["item"], row["value"]
         code = CODES.get(row["text"]) if item in {"sex", "handedness"} else None
         if item == "age" and not math.isnan(value):
-            code = f"{value:g}" if value < OLDEST else f"{OLDEST}+"
+            code = age_code(value)
         if code:
             told.setdefault(item, code)
     return told
+
+
+def age_code(years: float) -> str:
+    """Return an age as BIDS writes it, which tells no age from ``OLDEST`` on."""
+    return f"{years:g}" if years < OLDEST else f"{OLDEST}+"
 
 
 def _row(subject: str, answers: "pd.DataFrame") -> dict[str, Any]:
     rows = answers.to_dict("records")
     first = rows[0]
     # A line of the table is one row, whatever somebody wrote.
-    given = {row["item"]: " ".join(row["text"].split()) or _known(row["value"]) for row in rows}
+    given = {_column(row["item"]): " ".join(row["text"].split()) or _answer(row) for row in rows}
     missing = [f"{row['item']}: {row['missing']}" for row in rows if row["missing"]]
     return {
         "participant_id": subject,
@@ -155,6 +223,17 @@ def _row(subject: str, answers: "pd.DataFrame") -> dict[str, Any]:
     }
 
 
+def _answer(row: Mapping[str, Any]) -> float | str | None:
+    value = _known(row["value"])
+    if value is not None and row["item"] == "age" and _asks_about_person(row["version"]):
+        return age_code(value)
+    return value
+
+
+def _asks_about_person(version: str) -> bool:
+    return version.startswith(DEMOGRAPHICS)
+
+
 def _known(value: float) -> float | None:
     return None if math.isnan(value) else value
 
@@ -163,7 +242,7 @@ def _scored(answers: "pd.DataFrame", scores: "pd.DataFrame") -> dict[str, Any]:
     """Return the scores of the time at which ``answers`` were given."""
     rows = scores.merge(answers[["session", "step", "trial"]].drop_duplicates())
     named = zip(rows["score"], rows["value"], strict=True)
-    return {f"score_{name}": value for name, value in named}
+    return {f"{SCORE}{name}": value for name, value in named}
 
 
 def _item(item: Mapping[str, Any]) -> dict[str, Any]:

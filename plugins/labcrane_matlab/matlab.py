@@ -1,7 +1,7 @@
 """One MAT file per participant, and the function that loads them all."""
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from shutil import copyfile
@@ -49,6 +49,7 @@ class Matlab(Exporter):
 
     def __init__(self, settings: MatlabSettings) -> None:
         self._settings = settings
+        self._trials = Fields()
 
     def export(self, participants: Iterable[Participant], folder: Path) -> None:
         for participant in participants:
@@ -67,10 +68,12 @@ class Matlab(Exporter):
                 "participant": text(participant.name),
                 "status": text(str(participant.status)),
                 "why": text(participant.why),
-                "trials": columns(measures),
+                "trials": columns(measures, self._trials),
                 "questionnaires": columns(answers_of(participant)),
                 "scores": columns(scores_of(participant)),
-                "units": _units(dict(zip(trials["column"], trials["unit"], strict=True))),
+                "units": _units(
+                    dict(zip(trials["column"], trials["unit"], strict=True)), self._trials
+                ),
                 "sessions": cells(
                     [self._session(number, record) for number, record in participant.sessions()]
                 ),
@@ -131,10 +134,10 @@ def _read(count: int, read: Callable[[slice], Any]) -> Element:
     return texts(count, lambda: (_cell(value) for piece in pieces() for value in piece))
 
 
-def columns(table: "pd.DataFrame") -> Element:
+def columns(table: "pd.DataFrame", fields: "Fields | None" = None) -> Element:
     """Return a table as a struct of columns: numbers as doubles, everything else as cells."""
-    named = zip(fields([str(name) for name in table]), table, strict=True)
-    return struct({field: _column(table[name]) for field, name in named})
+    of = (fields or Fields()).of
+    return struct({of(str(name)): _column(table[name]) for name in table})
 
 
 def _column(values: "pd.Series[Any]") -> Element:
@@ -152,23 +155,44 @@ def _number(value: float) -> Element:
     return numbers(1, lambda: [np.array([value])])
 
 
-def fields(names: list[str]) -> list[str]:
-    """Return names that can be fields: letters, digits and underscores, all different."""
+class Fields:
+    """Names that can be fields: letters, digits and underscores, all different.
+
+    A name keeps the field that it was given first, so that a column is the same field in the files
+    of people whose columns differ.
+    """
+
+    def __init__(self) -> None:
+        self._fields: dict[str, str] = {}
+
+    def of(self, name: str) -> str:
+        """Return the field of a name."""
+        if name not in self._fields:
+            self._fields[name] = _field(name, self._fields.values())
+        return self._fields[name]
+
+
+def fields(names: Iterable[str]) -> list[str]:
+    """Return the fields of names that stand beside one another."""
     taken: list[str] = []
     for name in names:
-        field = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)[:LONGEST]
-        field = field if field[:1].isalpha() else f"x{field}"[:LONGEST]
-        number, unique = 1, field
-        while unique in taken:
-            number += 1
-            unique = f"{field[: LONGEST - 4]}_{number}"
-        taken.append(unique)
+        taken.append(_field(name, taken))
     return taken
 
 
-def _units(units: dict[str, str]) -> Element:
-    named = zip(fields(list(units)), units.values(), strict=True)
-    return struct({field: text(unit) for field, unit in named})
+def _field(name: str, taken: Collection[str]) -> str:
+    field = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)[:LONGEST]
+    field = field if field[:1].isalpha() else f"x{field}"[:LONGEST]
+    number, unique = 1, field
+    while unique in taken:
+        number += 1
+        unique = f"{field[: LONGEST - 4]}_{number}"
+    return unique
+
+
+def _units(units: Mapping[str, str], fields: Fields | None = None) -> Element:
+    of = (fields or Fields()).of
+    return struct({of(name): text(unit) for name, unit in units.items()})
 
 
 def _refuse_large(name: str, content: Element) -> None:

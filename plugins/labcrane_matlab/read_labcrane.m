@@ -102,7 +102,9 @@ elseif all(isnan(a))
 elseif all(cellfun(@isempty, b))
   b = NaN(numel(b), 1);
 else
-  error('labcrane:types', ['the column %s is words of one participant and numbers of another; ' ...
-    'read %s from a folder of its own'], name, who);
+  warning('labcrane:types', ['the column %s is words of some participants and numbers of others, ' ...
+    'as %s shows: it is all words here; the study may have been amended between them'], name, who);
+  a = arrayfun(@(x) sprintf('%.15g', x), a, 'UniformOutput', false);
+  a(strcmp(a, 'NaN')) = {''};
 end
 end

@@ -1,6 +1,6 @@
 """Streams as Arrow tables with the same time column, a stretch in memory at a time."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -69,22 +69,41 @@ def stream_tables(session: SessionRecord) -> Iterator[StreamTable]:
             yield StreamTable(name, [stream], names)
 
 
-def snake(table: "pd.DataFrame") -> "pd.DataFrame":
-    """Return a table whose columns are lower-case words with underscores, all different."""
-    return table.set_axis(snake_names([str(column) for column in table]), axis=1)
+class Names:
+    """What columns are called in an export: lower-case words with underscores, all different.
+
+    A column keeps the name that it was given first, whichever others somebody's table has. So
+    ``movement.time`` of a questionnaire is ``movement_time_2`` for everyone, beside the measure.
+    """
+
+    def __init__(self) -> None:
+        self._names: dict[str, str] = {}
+
+    def of(self, column: str) -> str:
+        """Return what a column is called."""
+        if column not in self._names:
+            self._names[column] = _unlike(self._names.values(), snake_case(column))
+        return self._names[column]
+
+    def table(self, table: "pd.DataFrame") -> "pd.DataFrame":
+        """Return a table whose columns are called so."""
+        return table.set_axis([self.of(str(column)) for column in table], axis=1)
 
 
 def snake_names(columns: Sequence[str]) -> list[str]:
-    """Return columns as lower-case words with underscores, all different."""
+    """Return columns of one table as lower-case words with underscores, all different."""
     names: list[str] = []
     for column in columns:
-        name = snake_case(column)
-        number, unique = 1, name
-        while unique in names:
-            number += 1
-            unique = f"{name}_{number}"
-        names.append(unique)
+        names.append(_unlike(names, snake_case(column)))
     return names
+
+
+def _unlike(taken: Collection[str], name: str) -> str:
+    number, unique = 1, name
+    while unique in taken:
+        number += 1
+        unique = f"{name}_{number}"
+    return unique
 
 
 def snake_case(name: str) -> str:

@@ -13,9 +13,9 @@ from labcrane.analysis import (
     measures_of,
     scores_of,
 )
-from labcrane_tables.frames import snake
+from labcrane_tables.frames import Names
 from labcrane_tables.settings import PsychDsSettings
-from labcrane_tables.tables import write_csv
+from labcrane_tables.tables import joined, write_csv
 
 OTHERS = ("questionnaires", "scores")
 """Tables beside that of movements."""
@@ -36,20 +36,20 @@ class PsychDs(Exporter):
         (folder / "data").mkdir()
         variables: dict[str, dict[str, str]] = {}
         title = study = ""
+        names = Names()
         for participant in participants:
             context = participant.context
             title, study = str(context.get("title", "")), str(context.get("study", ""))
             measures = beside_trials(measures_of(participant), participant)
             book = codebook_of(participant, measures)
-            table = snake(measures)
-            written = dict(zip(map(str, measures), map(str, table), strict=True))
+            table = names.table(measures)
             for row in book[book["table"] == "trials"].itertuples(index=False):
-                name = written[str(row.column)]
+                name = names.of(str(row.column))
                 variables.setdefault(name, _variable(name, *map(str, row[2:])))
             for number, own in table.groupby("session"):
                 subject = _key(participant.name)
                 name = f"study-{_key(study)}_subject-{subject}_session-{number}_data.csv"
-                write_csv(own, folder / "data" / name)
+                write_csv(joined([own]), folder / "data" / name)
             for what, answers in zip(OTHERS, (answers_of, scores_of), strict=True):
                 told = answers(participant)
                 if told.empty:  # what is in no file is not described either
@@ -60,7 +60,7 @@ class PsychDs(Exporter):
                 for number, own in told.groupby("session"):
                     subject = _key(participant.name)
                     name = f"study-{_key(study)}_subject-{subject}_session-{number}_desc-{what}"
-                    write_csv(own, folder / "data" / f"{name}_data.csv")
+                    write_csv(joined([own]), folder / "data" / f"{name}_data.csv")
         description = {
             "@context": "https://schema.org/",
             "@type": "Dataset",

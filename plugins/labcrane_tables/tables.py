@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import chain
@@ -23,7 +24,7 @@ from labcrane.analysis import (
     with_unseen_areas,
 )
 from labcrane.recording import SessionRecord, labelled
-from labcrane_tables.frames import StreamTable, snake, stream_tables
+from labcrane_tables.frames import Names, StreamTable, snake_case, stream_tables
 from labcrane_tables.settings import TableSettings
 
 if TYPE_CHECKING:
@@ -60,11 +61,12 @@ class Tables(Exporter):
         (folder / "streams").mkdir()
         people, trials, codebooks, answers, scores = [], [], [], [], []
         marks, looked_at = [], []
+        names = Names()
         events = _Growing(folder / "events")
         for participant in participants:
             people.append(_person(participant))
             measures = beside_trials(measures_of(participant), participant)
-            trials.append(snake(measures))
+            trials.append(names.table(measures))
             codebooks.append(codebook_of(participant, measures))
             answers.append(answers_of(participant))
             marks.append(annotations_of(participant))
@@ -83,7 +85,7 @@ class Tables(Exporter):
             write_csv(everything, folder / f"{name}.csv")
             everything.to_parquet(folder / f"{name}.parquet", index=False)
         write_csv(pd.DataFrame(people), folder / "participants.csv")
-        write_csv(_codebook(codebooks), folder / "codebook.csv")
+        write_csv(_codebook(codebooks, names), folder / "codebook.csv")
         copyfile(Path(__file__).with_name(READER), folder / READER)
 
     def _streams(
@@ -132,11 +134,26 @@ def packed(path: Path) -> Iterator[gzip.GzipFile]:
 
 
 def joined(tables: "Sequence[pd.DataFrame]") -> "pd.DataFrame":
-    """Return tables of the same columns below one another; those without rows say nothing."""
+    """Return tables of the same columns below one another; those without rows say nothing.
+
+    A column that holds numbers of some people and words of others, as after an amendment, is words.
+    """
     import pandas as pd
 
     filled = [table for table in tables if len(table)]
-    return pd.concat(filled or tables[:1], ignore_index=True)
+    every = pd.concat(filled or tables[:1], ignore_index=True)
+    mixed = {
+        name: column.map(_in_words)
+        for name, column in every.items()
+        if column.dtype == object and column.dropna().map(type).nunique() > 1
+    }
+    return every.assign(**mixed)
+
+
+def _in_words(value: object) -> object:
+    if isinstance(value, float):
+        return None if math.isnan(value) else f"{value:.15g}"
+    return None if value is None else str(value)
 
 
 class _Growing:
@@ -206,19 +223,20 @@ def _events(participant: Participant, number: int, session: SessionRecord) -> "p
     return events
 
 
-def _codebook(codebooks: "list[pd.DataFrame]") -> "pd.DataFrame":
+def _codebook(codebooks: "list[pd.DataFrame]", names: Names) -> "pd.DataFrame":
     """Join the participants' codebooks; columns are called as the tables call them."""
     import pandas as pd
 
-    from labcrane_tables.frames import snake_case
-
     book = pd.concat(codebooks).drop_duplicates(["table", "column"])
     groups = ("loop", "input", "command", "state", "task")
-    frames = book["table"].isin(groups) & (book["column"] != "time")
-    names = [
-        snake_case(f"{table}.{column}" if of_frames else column)
-        for table, column, of_frames in zip(book["table"], book["column"], frames, strict=True)
-    ]
-    book = book.assign(column=names)
+    called = []
+    for table, column in zip(book["table"], book["column"], strict=True):
+        if table == "trials":
+            called.append(names.of(column))
+        elif table in groups and column != "time":
+            called.append(snake_case(f"{table}.{column}"))
+        else:
+            called.append(snake_case(column))
+    book = book.assign(column=called)
     book["table"] = book["table"].where(~book["table"].isin(groups), "frames")
     return book.drop_duplicates(["table", "column"], ignore_index=True)
