@@ -6,7 +6,7 @@ more often is in ``beh`` instead: one table per session, one row for each time, 
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -223,7 +223,7 @@ def _row(subject: str, answers: "pd.DataFrame") -> dict[str, Any]:
     }
 
 
-def _answer(row: Mapping[str, Any]) -> float | str | None:
+def _answer(row: Mapping[Hashable, Any]) -> float | str | None:
     value = _known(row["value"])
     if value is not None and row["item"] == "age" and _asks_about_person(row["version"]):
         return age_code(value)

@@ -143,7 +143,7 @@ def joined(tables: "Sequence[pd.DataFrame]") -> "pd.DataFrame":
     filled = [table for table in tables if len(table)]
     every = pd.concat(filled or tables[:1], ignore_index=True)
     mixed = {
-        name: column.map(_in_words)
+        str(name): column.map(_in_words)
         for name, column in every.items()
         if column.dtype == object and column.dropna().map(type).nunique() > 1
     }
