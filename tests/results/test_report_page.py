@@ -25,6 +25,7 @@ from labcrane.analysis.report.style import COLUMN, MM, PAGE
 from labcrane.analysis.report.words import Results
 from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
+from labcrane.analysis.tables.definitions import MEASURES
 from results.synthetic import cohort_of_36
 
 GROUPS = ("none", "visual", "sound")
@@ -137,8 +138,9 @@ def told(
     empty = pd.DataFrame()
     anova = anova_table(whole, factors, primary)
     scores = pd.DataFrame(columns=list(SCORES))
+    units = {"movement_time": "s", **{name: unit for name, (unit, _) in MEASURES.items()}}
     results = Results(
-        "36 participants.", anova, *[empty] * 4, scores, empty, factors, 36, empty, primary
+        "36 participants.", anova, *[empty] * 4, scores, empty, factors, 36, empty, primary, units
     )
     loops = pd.DataFrame({
         "late_ticks": [3, 0], "ticks": [1000, 1000], "lateness_worst_ms": [12.5, 1.0],

@@ -16,6 +16,7 @@ from labcrane.analysis.report.words import STYLES, Results, paragraphs
 
 PAIRS = [(distance, side) for distance in (2.0, 3.0, 6.0) for side in ("left", "right")]
 NO_SCORES = pd.DataFrame(columns=list(SCORES))
+UNITS = {"movement_time": "s", "absolute_error": "m"}
 
 
 def drawn(seed: int, sizes: tuple[int, ...], sessions: int = 2) -> pd.DataFrame:
@@ -69,7 +70,7 @@ def found(
     def ask(table: pd.DataFrame) -> tuple[Results, str]:
         page = Page("drawn", tmp_path / "report.html", tmp_path)
         groups = dict(table.groupby("participant")["group"].first())
-        results = _study(page, table, NO_SCORES, groups, "The sample.", ())
+        results = _study(page, table, NO_SCORES, groups, "The sample.", (), UNITS)
         return results, page.write().read_text(encoding="utf-8")
 
     return ask

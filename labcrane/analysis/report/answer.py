@@ -25,7 +25,6 @@ from labcrane.analysis.report.words import (
     NAMES,
     STYLES,
     UNBALANCED,
-    UNITS,
     Results,
     f_test,
     lacking,
@@ -207,7 +206,7 @@ def _effect(
     levels = ", ".join(
         f"{of}{f'{level:g}' if isinstance(level, float) else level}{unit}"
         f"{f', n = {sizes[level]}' if column == GROUP else ''}: "
-        f"{mean:.3g} {UNITS.get(measure, '')}".rstrip()
+        f"{results.quantity(f'{mean:.3g}', measure)}"
         for level, mean in means.items()
     )
     return f"{said} {name} ({levels}; {f_test(row, STYLE, results.people)})"

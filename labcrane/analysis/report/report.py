@@ -1,12 +1,12 @@
 """The report of a study: one page, one page per participant, figures and tables."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Cohort, Participant, Status
-from labcrane.analysis.gaze import fixations_of, with_unseen_areas
+from labcrane.analysis.gaze import fixations_of, gaze_units, with_unseen_areas
 from labcrane.analysis.gaze_streams import unmeasured_of
 from labcrane.analysis.measures import DEFAULTS, MeasureSettings, measures_of
 from labcrane.analysis.parallel import work
@@ -111,10 +111,12 @@ def write_report(
     about = sample(_joined(answers), groups)
     page.heading("Sample")
     page.table("sample", about)
-    results = None
+    results, defined = None, _definitions(cohort, everything)
     if _is_aiming(everything[is_result(everything)]):
-        primary = _primary(cohort)
-        results = _study(page, everything, _joined(scores), groups, in_words(about), primary)
+        units = dict(zip(defined["measure"], defined["unit"], strict=True))
+        results = _study(
+            page, everything, _joined(scores), groups, in_words(about), _primary(cohort), units
+        )
     add_thresholds(page, _joined(thresholds), judge)
     _drifts(page, _joined(drifts))
     _unmeasured(page, _joined(without))
@@ -130,7 +132,7 @@ def write_report(
     page.heading("Definitions")
     page.say(f"Settings of the measures: {settings.as_dict()}")
     page.say(_by_which_rule(everything))
-    page.table("definitions", _definitions(cohort, everything))
+    page.table("definitions", defined)
     everything.to_csv(folder / "tables" / "movements.csv", index=False)
     return page.write()
 
@@ -240,6 +242,7 @@ def _study(
     groups: dict[str, str],
     about: str,
     primary: Sequence[str],
+    units: Mapping[str, str],
 ) -> Results:
     """Add what is only known of all together, and return what was found."""
     everything = with_factors(everything)
@@ -287,6 +290,7 @@ def _study(
         len(groups),
         short,
         tuple(primary),
+        units,
     )
     _in_words(page, found)
     return found
@@ -537,7 +541,7 @@ def _definitions(cohort: Cohort, everything: "pd.DataFrame") -> "pd.DataFrame":
     for person in cohort.included:
         units |= person.context.get("trial_units", {})
         recorded |= person.context.get("trial_definitions", {})
-    computed = {**MEASURES, **PRESENTED}
+    computed = {**MEASURES, **PRESENTED, **gaze_units(everything.columns)}
     rows = [(name, unit, meaning) for name, (unit, meaning) in computed.items()]
     rows += [
         (name, units.get(name, ""), recorded[name])

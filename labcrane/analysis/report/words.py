@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.report.factors import GROUP, PHASE, Factors
@@ -18,12 +18,11 @@ NAMES = {
     "onset_to_rest": "The time from onset to rest",
     "circle_to_circle": "The time from circle to circle, with reaction and dwell,",
     "absolute_error": "The distance from the target's centre",
-}
-UNITS = {
-    "movement_time": "s",
-    "onset_to_rest": "s",
-    "circle_to_circle": "s",
-    "absolute_error": "m",
+    "constant_error": "The signed error along the task axis",
+    "reaction_time": "Reaction time",
+    "path_length": "The length of the path",
+    "sparc": "SPARC, the smoothness of the tip's speed,",
+    "ldlj": "LDLJ, the smoothness of the tip's jerk,",
 }
 LOOKED = {
     "dwell_before_": "How long {} was looked at before onset",
@@ -115,6 +114,8 @@ class Results:
         What planned tests lack.
     primary
         Outcomes that the protocol names as primary.
+    units
+        Of the measures, by name; "1" and "" are none.
     """
 
     sample: str
@@ -129,6 +130,12 @@ class Results:
     people: int
     shortfalls: "pd.DataFrame"
     primary: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def quantity(self, number: str, measure: str) -> str:
+        """Return a number of a measure with its unit, if it has one."""
+        unit = self.units.get(measure, "")
+        return number if unit in {"", "1"} else f"{number} {unit}"
 
 
 def paragraphs(results: Results, style: Style) -> list[str]:
@@ -146,7 +153,7 @@ def paragraphs(results: Results, style: Style) -> list[str]:
         for table, words in (
             (results.trends, _trend), (results.scales, _scale), (results.contrasts, _contrast),
         ):  # fmt: skip
-            more += [words(row, style, results.people) for row in _of(table, measure)]
+            more += [words(row, style, results) for row in _of(table, measure)]
         found.append(" ".join([f"{name} {text}.", *filter(None, more)]))
     return found
 
@@ -242,21 +249,20 @@ def _effect(row: Mapping[str, Any], style: Style, people: int) -> str:
     return f"{said} over {style.plain(effect)}{where}, {f_test(row, style, people)}"
 
 
-def _trend(row: Mapping[str, Any], style: Style, people: int) -> str:
-    unit = UNITS.get(row["measure"], "")
+def _trend(row: Mapping[str, Any], style: Style, results: Results) -> str:
     phase = next((str(row[kind]) for kind in ("session", "block", "phase") if kind in row), "")
     word = "fell" if row["slope"] < 0 else "rose"
     holm = "" if math.isnan(row["p_holm"]) else f" (after Holm {_p(row['p_holm'], style)})"
     low, high = _number(row["slope_low"], style), _number(row["slope_high"], style)
+    step = results.quantity(f"{abs(row['slope']):.3g}", row["measure"])
     return (
         f"Over the positions of {style.plain(phase)}{_confounded(row)} it {word} by "
-        f"{abs(row['slope']):.3g} {unit} each, 95 {style.percent} CI [{low}, {high}], "
-        f"{_t(row, style)}{holm}"
-        f"{of_people(row, style, people)}."
+        f"{step} each, 95 {style.percent} CI [{low}, {high}], {_t(row, style)}{holm}"
+        f"{of_people(row, style, results.people)}."
     )
 
 
-def _scale(row: Mapping[str, Any], style: Style, people: int) -> str:
+def _scale(row: Mapping[str, Any], style: Style, results: Results) -> str:
     """Return what happened within a phase and from one to the next, over all participants."""
     spoken = {
         "slope": "Change with each position of",
@@ -266,29 +272,29 @@ def _scale(row: Mapping[str, Any], style: Style, people: int) -> str:
     }
     if row["group"] != "all" or row["quantity"] not in spoken:
         return ""
-    unit, mean = UNITS.get(row["measure"], ""), _number(row["mean"], style)
+    mean = results.quantity(_number(row["mean"], style), row["measure"])
     said = f"{spoken[row['quantity']]} {style.plain(str(row['phase']))}"
     if row["why"]:
         return f"{said}: not tested, {row['why']}."
     said += f", with {row['adjustment']}:" if row["adjustment"] else ":"
-    return f"{said} {mean} {unit}, {_t(row, style)}{of_people(row, style, people)}."
+    return f"{said} {mean}, {_t(row, style)}{of_people(row, style, results.people)}."
 
 
-def _contrast(row: Mapping[str, Any], style: Style, people: int) -> str:
+def _contrast(row: Mapping[str, Any], style: Style, results: Results) -> str:
     if math.isnan(row["t"]):
         return ""  # all are alike
     at = f" in {style.plain(str(row['at']))}" if row["at"] else ""
     at += _confounded(row)
     first, second = style.plain(str(row["first"])), style.plain(str(row["second"]))
-    unit = UNITS.get(row["measure"], "")
+    difference = results.quantity(_number(row["difference"], style), row["measure"])
     if row["factor"] == "distance":
         first, second = f"{first} m", f"{second} m"
     low, high = _number(row["ci_low"], style), _number(row["ci_high"], style)
     return (
-        f"{first} minus {second}{at}: {_number(row['difference'], style)} {unit}, "
+        f"{first} minus {second}{at}: {difference}, "
         f"95 {style.percent} CI [{low}, {high}], {style.symbol('t')}({row['df']:.0f}) = "
         f"{_number(row['t'], style, '.2f')}, Holm-corrected {_p(row['p_holm'], style)}"
-        f"{of_people(row, style, people)}."
+        f"{of_people(row, style, results.people)}."
     )
 
 

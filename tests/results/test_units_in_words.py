@@ -1,0 +1,65 @@
+"""Every number in the report's words has the unit of its measure, of whatever it is."""
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from labcrane.analysis.report import outcomes
+from labcrane.analysis.report.factors import factors_of, with_factors
+from labcrane.analysis.report.words import STYLES, Results, paragraphs
+from labcrane.analysis.tables.definitions import MEASURES
+
+UNITS = {"reaction_time": "s", **{name: unit for name, (unit, _) in MEASURES.items()}}
+SAMPLE = "Twelve people."
+
+
+def in_words(measure: str, scale: float) -> str:
+    """Return the report's paragraph on a measure that people get better in."""
+    dice = np.random.default_rng(475)
+    rows = [
+        {
+            "participant": f"P{person:03}", "group": ("none", "slow")[person % 2], "session": 1,
+            "sequence": place, "outcome": "success", "practice": 0.0, "pair": str(pair),
+            "distance": (2.0, 4.0)[pair % 2], "difficulty": (2.0, 4.0)[pair % 2],
+            measure: scale * (9.0 + person % 3 - 0.4 * place + pair % 2 + dice.normal(0.0, 0.4)),
+        }
+        for person in range(1, 13)
+        for place, pair in enumerate(dice.permutation(6), start=1)
+    ]  # fmt: skip
+    whole = with_factors(pd.DataFrame(rows))
+    factors = factors_of(whole)
+    primary = (measure,)
+    tables = (
+        outcomes.anova_table(whole, factors, primary),
+        outcomes.contrast_table(whole, factors, primary),
+        outcomes.trend_table(whole, factors, primary),
+        outcomes.time_scale_tables(whole, factors, primary)[0],
+    )
+    none = pd.DataFrame()
+    counts = pd.DataFrame({"trials": [72], "time_outs": [0], "others": [0]})
+    found = Results(
+        SAMPLE, *tables, none, none, counts, factors, 12, none, primary=primary, units=UNITS
+    )
+    return " ".join(paragraphs(found, STYLES["html"]))
+
+
+@pytest.mark.parametrize(
+    ("measure", "scale"),
+    [("constant_error", 0.01), ("reaction_time", 0.1), ("amplitude", 0.2), ("peak_speed_tip", 0.1)],
+)
+def test_steps_and_differences_of_an_outcome_have_its_unit(measure: str, scale: float) -> None:
+    said = in_words(measure, scale)
+    unit = re.escape(UNITS[measure])
+    assert re.search(rf"it fell by [0-9.]+ {unit} each, 95 % CI", said), said
+    assert re.search(rf"4 m: .?[0-9.]+ {unit}, 95 % CI", said), said
+    assert "  " not in said
+
+
+@pytest.mark.parametrize("measure", ["sparc", "path_ratio"])
+def test_an_outcome_without_a_unit_has_no_gap_where_it_would_be(measure: str) -> None:
+    said = in_words(measure, -1.0 if measure == "sparc" else 1.0)
+    assert re.search(r"it (fell|rose) by [0-9.]+ each, 95 % CI", said), said
+    assert "  " not in said
+    assert " 1 each" not in said
