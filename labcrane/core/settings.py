@@ -61,6 +61,14 @@ class Settings(StrictModel):
         """
         return {}
 
+    def directions(self, machine: Machine) -> Sequence[str]:
+        """Return what each axis does to the machine, a sentence each, in an operator's words.
+
+        A scheme's: ``left stick to the right: the slew turns to the right``. ``labcrane doctor``
+        says it before the controls are moved. Nothing by default.
+        """
+        return ()
+
     def provides(self, machine: Machine) -> Names:
         """Return the names that a component with these settings gives others to refer to, by kind.
 

@@ -53,10 +53,18 @@ def examine(
         ("disk", apart.Call(f"folder {data}", UNMOUNTED, disk.examine, (data, needed_bytes))),
     ):
         yield from _checks(area, apart.examine(call))
+    if study:
+        yield from _checks("scheme", directions(study))
     looks = components.of_study(study, registry) if study else components.of_everything(registry)[0]
     for look in looks:
         yield from _checks(look.area, components.examine(look, move=move))
     yield from _network(study, peers)
+
+
+def directions(study: Study) -> Iterator[Finding]:
+    """Say which way the machine goes, so that who moves the controls can tell it is meant."""
+    said = study.scheme.settings.directions(study.machine)
+    return (Finding(Verdict.PASS, text) for text in said)
 
 
 def left_out(registry: Registry, study: Study | None) -> Sequence[str]:

@@ -1,6 +1,6 @@
 """Settings of the schemes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationInfo, model_validator
@@ -17,6 +17,12 @@ from labcrane.core import (
     Unit,
     Usual,
     was_run,
+)
+from labcrane_schemes.directions import (
+    doubted_joints,
+    doubted_ways,
+    of_joints,
+    of_the_tip,
 )
 
 DIRECTIONS = {"base": ("x", "y", "z"), "arm": ("radial", "tangential", "vertical")}
@@ -64,10 +70,19 @@ class JointVelocitySettings(HandlingSettings):
     """Each axis turns one joint."""
 
     map: Annotated[dict[JointName, AxisName], Covers("joint"), Once()]
-    """Which axis turns which joint, one for every joint of the machine."""
+    """Which axis turns which joint, one for every joint of the machine. A positive slew is to the
+    left and a positive pitch down, so that with two sticks ``slew: -left.x`` turns right when the
+    left stick is pushed to the right, and ``shoulder: -right.y`` lifts when the right one is
+    pulled."""
 
     speed: float = Field(default=1.0, gt=0.0, le=1.0)
     """Joint speed at full deflection, as a fraction of the machine's joint speeds."""
+
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        return {**super().doubts(machine), **doubted_joints(machine, self.map)}
+
+    def directions(self, machine: Machine) -> Sequence[str]:
+        return of_joints(machine, self.map)
 
 
 class EndEffectorSettings(HandlingSettings):
@@ -75,7 +90,10 @@ class EndEffectorSettings(HandlingSettings):
 
     map: Annotated[dict[Direction, AxisName], Covers("direction of the frame", own=True), Once()]
     """Which axis moves the tip along which direction: x, y and z of the base frame, or radial,
-    tangential and vertical as seen from the slew axis (see ``frame``)."""
+    tangential and vertical as seen from the slew axis (see ``frame``). They are positive away from
+    the operator, to the left and up, so that with two sticks ``{x: -left.y, y: -left.x,
+    z: right.y}`` moves the tip where a stick is pushed, and lifts it when the right one is
+    pulled."""
 
     frame: Literal["base", "arm"] = "base"
     """Whether the directions stay with the base or turn with the arm."""
@@ -98,6 +116,12 @@ class EndEffectorSettings(HandlingSettings):
 
     def provides(self, machine: Machine) -> Names:
         return {"direction of the frame": DIRECTIONS[self.frame]}
+
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        return {**super().doubts(machine), **doubted_ways(self.map)}
+
+    def directions(self, machine: Machine) -> Sequence[str]:
+        return of_the_tip(self.map)
 
     @model_validator(mode="before")
     @classmethod
@@ -144,3 +168,11 @@ class SwitchableSettings(Settings):
             for name, settings in either.items()
             for key, text in settings.doubts(machine).items()
         }
+
+    def directions(self, machine: Machine) -> Sequence[str]:
+        either = {"joint_velocity": self.joint_velocity, "end_effector": self.end_effector}
+        return tuple(
+            f"with {name}, {text}"
+            for name, settings in either.items()
+            for text in settings.directions(machine)
+        )

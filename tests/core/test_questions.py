@@ -59,7 +59,7 @@ UNLIKE = [
     (
         f"use: joint_velocity\n  {MAP}",
         f"use: switchable\n  button: left.trigger\n  joint_velocity: {{{MAP}}}\n"
-        "  end_effector: {speed_m_s: 0.5, map: {x: left.y, y: -left.x, z: right.y}}",
+        "  end_effector: {speed_m_s: 0.5, map: {x: -left.y, y: -left.x, z: right.y}}",
     )
 ]
 

@@ -7,14 +7,22 @@ bucket in.
 
 import re
 from pathlib import Path
+from random import Random
+from shutil import copytree
 
 import numpy as np
 import pytest
 from cranes import needs_bullet, needs_mujoco
+from scheme_setups import LOW, MACHINES, STICKS, end_effector, joint_velocity, push, ready
 
+from labcrane.doctor.checks import directions
+from labcrane.machines.kinematics import jacobian
+from labcrane.protocol.questions import questions
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
+from labcrane_schemes.end_effector import EndEffector
+from labcrane_schemes.joint_velocity import JointVelocity
 from labcrane_view.areas import Projection
 from labcrane_view.settings import CAMERAS
 
@@ -127,3 +135,130 @@ def test_the_arm_of_the_scenarios_turns_the_way_the_stick_says() -> None:
     for way in (1.0, -1.0):
         before, after = moved(path, left_x=way)
         assert way * (before[1] - after[1]) > 0.02, "y is to the left of who looks along x"
+
+
+MOVES = {
+    "turns to the left": (1, 1.0), "turns to the right": (1, -1.0),
+    "goes to the left": (1, 1.0), "goes to the right": (1, -1.0),
+    "goes away from you": (0, 1.0), "goes towards you": (0, -1.0),
+    "goes up": (2, 1.0), "goes down": (2, -1.0),
+}  # fmt: skip
+"""Along which axis of the base frame the tip goes, and which way, of an arm straight ahead."""
+
+PUSHES = {
+    "left stick to the right": "left_x", "right stick to the right": "right_x",
+    "left stick towards you": "left_y", "right stick towards you": "right_y",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("seed", range(12))
+def test_the_machine_goes_where_the_words_of_its_map_say(name: str, seed: int) -> None:
+    machine, dice = MACHINES[name], Random(seed)
+    axes = [f"{dice.choice('-+')}{axis}".lstrip("+") for axis in STICKS if "trigger" not in axis]
+    dice.shuffle(axes)
+    frame = dice.choice(["base", "arm"])
+    ways = ("x", "y", "z") if frame == "base" else ("radial", "tangential", "vertical")
+    joints = joint_velocity(map=dict(zip(machine.names, axes, strict=True)))
+    tip = end_effector(frame=frame, map=dict(zip(ways, axes, strict=False)))
+    for settings, controller in ((joints, JointVelocity), (tip, EndEffector)):
+        said = settings.directions(machine)
+        assert len(said) == len(settings.map)
+        scheme = ready(controller(settings, machine), machine)
+        for sentence, moved in zip(said, settings.map, strict=True):
+            pushed, goes = sentence.split(": ")
+            along, sign = MOVES[goes.removeprefix(f"the {moved} ").removeprefix("the tip ")]
+            state = LOW[name]
+            speeds = scheme.command(push(**{PUSHES[pushed]: 0.8}), state)[: len(machine.names)]
+            velocity = jacobian(machine, state) @ speeds
+            assert sign * velocity[along] > 0.01, sentence
+
+
+MAP = (
+    "use: joint_velocity\n"
+    "  map: {slew: -left.x, elbow: left.y, wrist: -right.x, shoulder: -right.y}"
+)
+TIP = "use: end_effector\n  map: {x: -left.y, y: -left.x, z: right.y}"
+ARM = (
+    "use: end_effector\n  frame: arm\n"
+    "  map: {radial: -left.y, tangential: -left.x, vertical: right.y}"
+)
+BOTH = (
+    "use: switchable\n  button: left.trigger\n  joint_velocity: {map: {slew: -left.x, "
+    "elbow: left.y, wrist: -right.x, shoulder: -right.y}}\n"
+    "  end_effector: {map: {x: -left.y, y: -left.x, z: right.y}}"
+)
+ROUND = {
+    "slew: -left.x": "turns to the left when the left stick is moved to the right",
+    "wrist: -right.x": "wrist goes down when the right stick is moved to the right",
+    "shoulder: -right.y": "shoulder goes down when the right stick is moved towards you",
+    " y: -left.x": "tip goes to the left when the left stick is moved to the right",
+    "tangential: -left.x": "tip goes to the left when the left stick is moved to the right",
+    "{x: -left.y": "tip goes away from you when the left stick is moved towards you",
+    "radial: -left.y": "tip goes away from you when the left stick is moved towards you",
+}
+"""What is turned round by a minus that is left out."""
+
+
+def a_study(folder: Path, scheme: str, more: str = "") -> Path:
+    copytree(ROOT / "protocols" / "aiming", folder / "aiming", dirs_exist_ok=True)
+    path = folder / "aiming" / "protocol.yaml"
+    text = (ROOT / "protocols" / "aiming" / "protocol.yaml").read_text("utf-8")
+    written = f"{MAP}\n  dead_zone: 0.05\n  expo: 0.2"
+    assert written in text
+    path.write_text(text.replace(written, scheme).replace("rate_hz:", f"{more}rate_hz:"), "utf-8")
+    return path
+
+
+def asked_of(path: Path) -> dict[str, str]:
+    """Return what a check asks of the scheme's map."""
+    found = questions(load(path, discover()))
+    return {each.key: each.text for each in found if ".map." in each.key}
+
+
+@pytest.mark.parametrize("scheme", [MAP, TIP, ARM, BOTH], ids=["joints", "tip", "arm", "both"])
+def test_a_stick_that_moves_the_machine_the_other_way_is_asked_about(
+    tmp_path: Path, scheme: str
+) -> None:
+    assert asked_of(a_study(tmp_path, scheme)) == {}
+    written = [each for each in ROUND if each in scheme]
+    assert len(written) >= 2
+    for each in written:
+        turned = a_study(tmp_path, scheme.replace(each, each.replace("-", "")))
+        ((key, text),) = asked_of(turned).items()
+        moved = each.strip(" {").split(":")[0]
+        assert key.endswith(f"map.{moved}")
+        assert ROUND[each] in text
+        answered = a_study(
+            tmp_path, scheme.replace(each, each.replace("-", "")), f"expected: [{key}]\n"
+        )
+        assert asked_of(answered) == {}
+
+
+def test_a_push_that_would_lift_the_tip_is_asked_about(tmp_path: Path) -> None:
+    path = a_study(tmp_path, TIP.replace("z: right.y", "z: -right.y"))
+    assert asked_of(path) == {
+        "scheme.map.z": "scheme.map.z is -right.y, so that the tip goes down when the right stick "
+        "is moved towards you; with right.y it is the other way round; is that meant?"
+    }
+
+
+def test_a_gripper_and_axes_of_no_stick_have_no_usual_direction() -> None:
+    study = load(ROOT / "protocols" / "retrieval" / "joysticks.yaml", discover())
+    settings = study.scheme.settings
+    assert "map.jaws" not in settings.doubts(study.machine)
+    assert "right stick to the right: the jaws goes down" not in settings.directions(study.machine)
+    levers = joint_velocity(map={name: name for name in MACHINES["ch8"].names})
+    assert levers.doubts(MACHINES["ch8"]) == {}
+    assert levers.directions(MACHINES["ch8"])[1] == "shoulder forward: the shoulder goes down"
+
+
+def test_the_doctor_says_which_way_the_machine_of_a_study_goes() -> None:
+    study = load(ROOT / "protocols" / "aiming" / "protocol.yaml", discover())
+    said = [finding.text for finding in directions(study)]
+    assert said == [
+        "left stick to the right: the slew turns to the right",
+        "left stick towards you: the elbow goes down",
+        "right stick to the right: the wrist goes up",
+        "right stick towards you: the shoulder goes up",
+    ]

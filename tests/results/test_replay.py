@@ -98,7 +98,7 @@ def test_another_version_is_named(path: Path, monkeypatch: pytest.MonkeyPatch) -
 SWITCHED = (
     "  use: switchable\n  button: left.trigger\n  start: end_effector\n"
     "  joint_velocity: {map: {slew: -left.x, elbow: left.y, wrist: -right.x, "
-    "shoulder: -right.y}}\n  end_effector: {map: {x: left.y, y: -left.x, z: right.y}}\n"
+    "shoulder: -right.y}}\n  end_effector: {map: {x: -left.y, y: -left.x, z: right.y}}\n"
 )
 
 

@@ -1,0 +1,118 @@
+"""Directions: which way the machine goes when a stick is pushed, in words.
+
+A machine goes where the stick points: to the right turns right, a pull lifts or draws in, and the
+last link curls in to the left. So it is on excavators (ISO 10968, SAE J1177) and on cranes with
+two sticks.
+"""
+
+from collections.abc import Mapping
+
+from labcrane import Machine
+
+STICKS = ("left.x", "left.y", "right.x", "right.y")
+"""Axes of two sticks: x is positive to the right, y towards the operator."""
+
+WAYS = {"left.x": "left stick", "right.x": "right stick"}
+"""Axes of two sticks that are positive to the right."""
+
+PULLED = {"left.y": "left stick", "right.y": "right stick"}
+"""Axes of two sticks that are positive towards the operator."""
+
+TO_THE_RIGHT, TOWARDS_YOU = "to the right", "towards you"
+
+WAYS = {
+    "x": ("away from you", "towards you"),
+    "y": ("to the left", "to the right"),
+    "z": ("up", "down"),
+    "radial": ("away from you", "towards you"),
+    "tangential": ("to the left", "to the right"),
+    "vertical": ("up", "down"),
+}
+"""Where the tip goes along each direction: forward, and backward."""
+
+USUAL = {
+    ("y", "x"): -1.0,
+    ("tangential", "x"): -1.0,
+    ("x", "y"): -1.0,
+    ("radial", "y"): -1.0,
+    ("z", "y"): 1.0,
+    ("vertical", "y"): 1.0,
+}
+"""With which sign the tip goes where the stick points: by direction of the tip, and x or y of the
+stick. A pull draws it in, or lifts it."""
+
+
+def of_joints(machine: Machine, written: Mapping[str, str]) -> tuple[str, ...]:
+    """Return what each axis of a map to joints does, a sentence each."""
+    return tuple(
+        _said(axis, _joint_goes(machine, joint, _sign(axis))) for joint, axis in written.items()
+    )
+
+
+def of_the_tip(written: Mapping[str, str]) -> tuple[str, ...]:
+    """Return what each axis of a map to directions of the tip does, a sentence each."""
+    return tuple(_said(axis, _tip_goes(way, _sign(axis))) for way, axis in written.items())
+
+
+def doubted_joints(machine: Machine, written: Mapping[str, str]) -> Mapping[str, str]:
+    """Return the axes of two sticks that turn a joint the other way, by key of the settings."""
+    slew, first, last = machine.joints[0], machine.joints[1], machine.joints[-1]
+    # A positive slew is to the left, a positive pitch down.
+    usual = {(slew.name, "x"): -1.0, (first.name, "y"): -1.0}
+    if last.a:  # else it carries nothing, and is a gripper
+        usual[last.name, "x"] = -1.0
+    return {
+        f"map.{joint}": _doubt(axis, _joint_goes(machine, joint, _sign(axis)))
+        for joint, axis in written.items()
+        if _is_unusual(joint, axis, usual)
+    }
+
+
+def doubted_ways(written: Mapping[str, str]) -> Mapping[str, str]:
+    """Return the axes of two sticks that move the tip the other way, by key of the settings."""
+    return {
+        f"map.{way}": _doubt(axis, _tip_goes(way, _sign(axis)))
+        for way, axis in written.items()
+        if _is_unusual(way, axis, USUAL)
+    }
+
+
+def _is_unusual(moved: str, axis: str, usual: Mapping[tuple[str, str], float]) -> bool:
+    name, sign = axis.removeprefix("-"), _sign(axis)
+    return name in STICKS and usual.get((moved, name[-1]), sign) != sign
+
+
+def _doubt(axis: str, goes: str) -> str:
+    other = axis[1:] if axis.startswith("-") else f"-{axis}"
+    stick, _, where = _pushed(axis).partition(" stick ")
+    return (
+        f"is {axis}, so that the {goes} when the {stick} stick is moved {where}; "
+        f"with {other} it is the other way round"
+    )
+
+
+def _said(axis: str, goes: str) -> str:
+    return f"{_pushed(axis)}: the {goes}"
+
+
+def _pushed(axis: str) -> str:
+    name = axis.removeprefix("-")
+    side, _, way = name.partition(".")
+    where = {"x": "to the right", "y": "towards you"}
+    return f"{side} stick {where[way]}" if name in STICKS else f"{name} forward"
+
+
+def _sign(axis: str) -> float:
+    return -1.0 if axis.startswith("-") else 1.0
+
+
+def _joint_goes(machine: Machine, joint: str, sign: float) -> str:
+    if joint == machine.joints[0].name:
+        return f"{joint} turns {WAYS['y'][sign < 0.0]}"
+    if joint == machine.joints[-1].name and not machine.joints[-1].a:
+        return f"{joint} turns to {'larger' if sign > 0.0 else 'smaller'} angles"
+    return f"{joint} goes {WAYS['z'][sign > 0.0]}"  # positive pitch is down
+
+
+def _tip_goes(way: str, sign: float) -> str:
+    return f"tip goes {WAYS[way][sign < 0.0]}"
