@@ -31,6 +31,8 @@ from labcrane.analysis.report.factors import (
 )
 from labcrane.analysis.report.html import Page
 from labcrane.analysis.report.outcomes import measures_in
+from labcrane.analysis.report.protocols import in_words as protocols_in_words
+from labcrane.analysis.report.protocols import unlike_protocols
 from labcrane.analysis.report.sample import in_words, sample
 from labcrane.analysis.report.shortfalls import Made, shortfalls
 from labcrane.analysis.report.thresholds import Judge, add_thresholds, thresholds_of
@@ -108,15 +110,11 @@ def write_report(
     groups = {
         person.name: _group(own) for person, own in zip(cohort.included, movements, strict=True)
     }
-    about = sample(_joined(answers), groups)
-    page.heading("Sample")
-    page.table("sample", about)
+    about = _sample(page, cohort, _joined(answers), groups)
     results, defined = None, _definitions(cohort, everything)
     if _is_aiming(everything[is_result(everything)]):
         units = dict(zip(defined["measure"], defined["unit"], strict=True))
-        results = _study(
-            page, everything, _joined(scores), groups, in_words(about), _primary(cohort), units
-        )
+        results = _study(page, everything, _joined(scores), groups, about, _primary(cohort), units)
     add_thresholds(page, _joined(thresholds), judge)
     _drifts(page, _joined(drifts))
     _unmeasured(page, _joined(without))
@@ -128,7 +126,7 @@ def write_report(
         page.say(
             f"Used as told, though nobody knows how right their times are: {'; '.join(unprobed)}."
         )
-    page.lead(answer(cohort, everything, quality, in_words(about), results))
+    page.lead(answer(cohort, everything, quality, about, results))
     page.heading("Definitions")
     page.say(f"Settings of the measures: {settings.as_dict()}")
     page.say(_by_which_rule(everything))
@@ -233,6 +231,19 @@ def _who(page: Page, cohort: Cohort, everything: "pd.DataFrame") -> None:
                 columns=["participant", "session", "trial", "attempt", "outcome", "error"]
             ),
         )
+
+
+def _sample(page: Page, cohort: Cohort, answers: "pd.DataFrame", groups: dict[str, str]) -> str:
+    """Add who took part and by which protocols, and return it in words."""
+    unlike = unlike_protocols(cohort)
+    page.say(protocols_in_words(unlike))
+    if len(unlike):
+        page.table("protocols", unlike)
+    people = sample(answers, groups)
+    page.heading("Sample")
+    page.table("sample", people)
+    about = in_words(people)
+    return f"{about} {protocols_in_words(unlike)}" if len(unlike) else about
 
 
 def _study(
