@@ -7,6 +7,7 @@ those of a simulation, so that today's code must make them again, bit for bit.
 import gzip
 import json
 import math
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -15,6 +16,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
 import pyxdf
 
@@ -283,3 +285,21 @@ def test_the_journal_of_before_makes_the_participant_file_of_before(
     assert all(
         np.asarray(new[path][0]).tobytes() == np.asarray(old[path][0]).tobytes() for path in old
     )
+
+
+@pytest.mark.slow
+def test_a_report_of_before_has_the_unit_of_everything_that_was_recorded_with_one(
+    before: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(before, tmp_path / "data" / NAME)
+    labcrane_command(
+        "report", tmp_path / "data", "--include", "simulated", "--out", tmp_path / "out"
+    )
+    table = pd.read_csv(tmp_path / "out" / "tables" / "definitions.csv", index_col="measure")
+    context = labcrane.open_recording(before / f"{NAME}.h5").session(1).context
+    assert "trial_definitions" not in context
+    measured = set(table.index)
+    recorded = {each: unit for each, unit in context["trial_units"].items() if each in measured}
+    assert {"movement_time", "reaction_time", "error"} <= recorded.keys()
+    assert table.loc[list(recorded), "unit"].to_dict() == recorded
+    assert table.loc["movement_onset", "unit"] == "s"  # measured anew

@@ -547,7 +547,7 @@ def _definitions(cohort: Cohort, everything: "pd.DataFrame") -> "pd.DataFrame":
     """Return unit and meaning of the measures, and of what the sessions recorded of each trial."""
     import pandas as pd
 
-    units: dict[str, str] = {}
+    units = dict.fromkeys(TIMES, "s")  # some are measured anew where none was recorded
     recorded: dict[str, str] = {}
     for person in cohort.included:
         units |= person.context.get("trial_units", {})
@@ -555,9 +555,9 @@ def _definitions(cohort: Cohort, everything: "pd.DataFrame") -> "pd.DataFrame":
     computed = {**MEASURES, **PRESENTED, **gaze_units(everything.columns)}
     rows = [(name, unit, meaning) for name, (unit, meaning) in computed.items()]
     rows += [
-        (name, units.get(name, ""), recorded[name])
+        (name, units.get(name, ""), recorded.get(name, ""))
         for name in map(str, everything)
-        if name in recorded and name not in computed
+        if name in {**units, **recorded} and name not in computed
     ]
     return pd.DataFrame(rows, columns=["measure", "unit", "meaning"])
 
