@@ -475,7 +475,8 @@ def faults(study: str, text: str, seed: int = 0) -> Iterator[Wrong]:
             begins = _column(new, entry.start + 1)
             inside = {begins + 1} if what[0] in "[{" else set()
             columns = frozenset({_column(text, entry.begin), begins, *inside, *around})
-            gone = text[entry.start : entry.end] if what in NOTHING or last == "name" else ""
+            named = last == "name" or "keys" in holder[-1:]  # others name it
+            gone = text[entry.start : entry.end] if what in NOTHING or named else ""
             yield Wrong(
                 study,
                 f"written as {what}",

@@ -159,7 +159,7 @@ def test_a_lean_installation_does_its_part_and_names_the_extra_for_the_rest(
     assert refused.returncode == 2
     assert f"'dual_joystick' needs pygame, which is not installed: {extra}" in refused.stderr
     refused = labcrane_command("check", AIMING)
-    for module in ("pygame", "pybullet", "pyo", "panda3d"):
+    for module in ("pygame", "mujoco", "pyo", "panda3d"):
         assert f"needs {module}, which is not installed: {extra}" in refused.stderr
     refused = labcrane_command("run", kinematic, "--participant", "P002")
     assert f"needs pygame, which is not installed: {extra}" in refused.stderr
