@@ -11,6 +11,7 @@ from statsmodels.stats.anova import AnovaRM
 
 from labcrane.analysis.report import outcomes
 from labcrane.analysis.report.factors import factors_of, with_factors
+from labcrane.analysis.report.words import STYLES, Results, paragraphs
 from labcrane.cli.app import main
 from labcrane.simulation.power import Claim, read_effect
 from labcrane.simulation.reported import ask, plan_test
@@ -96,6 +97,39 @@ def test_conditions_in_one_order_for_everybody_cannot_be_told_from_it() -> None:
     said = "the order in which conditions came"
     assert of_condition(outcomes.anova_table, alike)["confounded"] == said
     assert of_condition(outcomes.contrast_table, alike)["confounded"] == said
+
+
+@pytest.mark.parametrize("people", range(4, 13))
+def test_orders_that_were_not_had_equally_often_are_told_with_their_numbers(people: int) -> None:
+    names = ("a", "b", "c")
+    found = factors_of(crossover(6, people, names)).uneven
+    first = [sum(person % 3 == place for person in range(people)) for place in range(3)]
+    if people % 3 == 0:
+        assert found == ""
+    else:
+        assert found == (
+            "Conditions did not come equally often in each place: in 1 b1, "
+            f"a for {first[0]}, b for {first[1]} and c for {first[2]} participants; what changes "
+            "from place to place is in part in the differences between them."
+        )
+
+
+def test_uneven_orders_are_told_beside_the_sample() -> None:
+    factors = factors_of(crossover(6, 7, ("a", "b_1", "c")))
+    nothing = pd.DataFrame()
+    counts = pd.DataFrame({"trials": [1], "time_outs": [0], "others": [0]})
+    results = Results("Seven people.", *[nothing] * 6, counts, factors, 7, nothing)
+    said = "in 1 b1, a for 3, b\\_1 for 2 and c for 2 participants"
+    assert said in paragraphs(results, STYLES["tex"])[0]
+
+
+def test_who_lacks_a_condition_does_not_count_in_whether_orders_are_even() -> None:
+    movements = crossover(2, 10, ("plain", "tone"))
+    gone = (movements["participant"] == "P003") & (movements["condition"] == "tone")
+    assert "plain for 5 and tone for 4 participants" in factors_of(movements[~gone]).uneven
+    both = gone | ((movements["participant"] == "P004") & (movements["condition"] == "tone"))
+    assert factors_of(movements[~both]).uneven == ""
+    assert factors_of(crossover(2, 9, ("plain", "tone"), balanced=False)).uneven == ""
 
 
 def test_power_tests_the_difference_of_conditions_as_the_report_does() -> None:

@@ -81,7 +81,8 @@ def _design(cohort: Cohort, everything: "pd.DataFrame", results: Results | None)
         else "There are no groups."
     )
     merged = f" {UNBALANCED}." if factors.unbalanced else ""
-    return f"{said}. Within participants: {', '.join(within)}. {between}{merged}"
+    uneven = f" {factors.uneven}" if factors.uneven else ""
+    return f"{said}. Within participants: {', '.join(within)}. {between}{merged}{uneven}"
 
 
 def _columns(factors: Factors) -> Iterator[tuple[str, str, str]]:

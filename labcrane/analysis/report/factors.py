@@ -38,6 +38,8 @@ class Factors:
         Within participants, two or more, in whatever order each had them; otherwise empty.
     people
         Everybody in the sample, also who has no movement, and their group.
+    uneven
+        In a sentence, where conditions did not come equally often; empty where they did.
     """
 
     groups: tuple[str, ...]
@@ -49,6 +51,7 @@ class Factors:
     crossed: dict[str, tuple[Any, ...]]
     people: dict[str, str]
     conditions: tuple[str, ...] = ()
+    uneven: str = ""
 
     @property
     def between(self) -> list[str]:
@@ -168,7 +171,10 @@ def factors_of(table: "pd.DataFrame", people: Mapping[str, str] | None = None) -
         people = dict(zip(map(str, first["participant"]), map(str, first[GROUP]), strict=True))
     practice = len(counted) < len(table)
     own = conditions_in(counted)
-    return Factors(several, phases, kind, places, practice, targets, crossed, dict(people), own)
+    uneven = _uneven(counted, own) if own else ""
+    return Factors(
+        several, phases, kind, places, practice, targets, crossed, dict(people), own, uneven
+    )
 
 
 def conditions_in(table: "pd.DataFrame") -> tuple[str, ...]:
@@ -177,6 +183,31 @@ def conditions_in(table: "pd.DataFrame") -> tuple[str, ...]:
         return ()
     named = {str(name) for name in table[CONDITION].dropna().unique() if name != ""}
     return tuple(sorted(named)) if len(named) > 1 else ()
+
+
+def _uneven(counted: "pd.DataFrame", conditions: tuple[str, ...]) -> str:
+    """Return the first phase in which some conditions had more people than others, in a sentence.
+
+    Of those who had all conditions. What people learn from phase to phase is then in part in the
+    differences between conditions. Where all had one order, tests say that it is confounded.
+    """
+    had = counted[counted[CONDITION].isin(conditions)]
+    had = had.drop_duplicates(["participant", PHASE, CONDITION])
+    whole = had.groupby("participant")[CONDITION].nunique() == len(conditions)
+    had = had[had["participant"].isin(whole[whole].index)]
+    orders = had.sort_values(PHASE).groupby("participant")[CONDITION].agg(tuple)
+    if orders.nunique() < 2:  # noqa: PLR2004
+        return ""
+    for phase, own in had.groupby(PHASE):
+        counts = own[CONDITION].value_counts()
+        people = [f"{name} for {counts.get(name, 0)}" for name in conditions]
+        if counts.nunique() > 1 or len(counts) < len(conditions):
+            return (
+                f"Conditions did not come equally often in each place: in {phase}, "
+                f"{', '.join(people[:-1])} and {people[-1]} participants; what changes from place "
+                "to place is in part in the differences between them."
+            )
+    return ""
 
 
 def _crossed(counted: "pd.DataFrame") -> dict[str, tuple[Any, ...]]:

@@ -143,6 +143,8 @@ def paragraphs(results: Results, style: Style) -> list[str]:
     found = [style.plain(results.sample) + " " + _given_up(results.time_outs, style)]
     if results.factors.unbalanced:
         found[0] += f" {UNBALANCED}."
+    if results.factors.uneven:
+        found[0] += f" {style.plain(results.factors.uneven)}"
     tests = (results.anova, results.gaze, results.scores, results.shortfalls)
     for measure in dict.fromkeys(name for table in tests for name in _measures(table)):
         effects = [row for table in tests[:3] for row in _of(table, measure)]
