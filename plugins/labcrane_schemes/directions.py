@@ -12,14 +12,6 @@ from labcrane import Machine
 STICKS = ("left.x", "left.y", "right.x", "right.y")
 """Axes of two sticks: x is positive to the right, y towards the operator."""
 
-WAYS = {"left.x": "left stick", "right.x": "right stick"}
-"""Axes of two sticks that are positive to the right."""
-
-PULLED = {"left.y": "left stick", "right.y": "right stick"}
-"""Axes of two sticks that are positive towards the operator."""
-
-TO_THE_RIGHT, TOWARDS_YOU = "to the right", "towards you"
-
 WAYS = {
     "x": ("away from you", "towards you"),
     "y": ("to the left", "to the right"),
