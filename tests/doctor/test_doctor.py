@@ -215,8 +215,8 @@ def test_the_command_says_all_as_json_and_keeps_it_for_the_record(
     said = json.loads(capfd.readouterr().out)
     areas = {check["area"] for check in said["checks"]}
     assert areas == {
-            "version", "clock", "scheduling", "screen", "disk", "input dual_joystick", "lsl"
-        }  # fmt: skip
+        "version", "clock", "scheduling", "screen", "disk", "scheme", "input dual_joystick", "lsl",
+    }  # fmt: skip
     failed = [check for check in said["checks"] if check["verdict"] == "FAIL"]
     assert all(check["advice"] for check in failed)
     assert (status == 1) == bool(failed)
