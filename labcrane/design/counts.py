@@ -7,7 +7,7 @@ Whoever counts trials counts those of :attr:`SessionPlan.trials`, on every scree
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Self
+from typing import Any, Self
 
 from labcrane.design.plan import SessionPlan
 
@@ -40,6 +40,21 @@ class TrialCounts:
         return cls(
             {trial.number: place for place, trial in enumerate(plan.trials, start=1)},
             {trial.number: place for place, trial in enumerate(practice, start=1)},
+        )
+
+    @classmethod
+    def recorded(cls, blocks: Iterable[Mapping[str, Any]]) -> Self:
+        """Return what the trials of a recording are called, by the ``plan`` in its context.
+
+        Files older than that part of the context leave every trial without a name.
+        """
+        found: dict[bool, list[int]] = {False: [], True: []}
+        for block in blocks:
+            found[bool(block.get("practice"))] += numbers(str(block.get("counted", "")))
+        counted, practice = found[False], found[True]
+        return cls(
+            {number: place for place, number in enumerate(counted, start=1)},
+            {number: place for place, number in enumerate(practice, start=1)},
         )
 
     @property
@@ -81,7 +96,7 @@ def _trials(wanted: Sequence[int]) -> str:
     return f"trial{'s' if len(wanted) > 1 else ''} {spans(wanted)}"
 
 
-def spans(wanted: Sequence[int]) -> str:
+def spans(wanted: Iterable[int]) -> str:
     """Return whole numbers as text: ``1-3 5``."""
     found = sorted(set(wanted))
     gaps = [at for at, (one, two) in enumerate(pairwise(found), start=1) if two > one + 1]

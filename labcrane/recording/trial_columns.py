@@ -13,7 +13,12 @@ OWN = (
     Signal("paused", "s", definition="how long the session was paused during the trial"),
     Signal("late_ticks", "1", definition="ticks of the trial that began more than a period late"),
     Signal("worst_lateness", "s", definition="how late the latest tick of the trial began"),
-    Signal("trial", "1", definition="number of the trial in the session, from 1"),
+    Signal(
+        "trial",
+        "1",
+        definition="number of the trial in the plan of the session, from 1; what only leads to a "
+        "trial has a number too, so that trial 8 of 32 on the screen may be number 10 here",
+    ),
     Signal("attempt", "1", definition="number of the attempt at the trial, from 1"),
     Signal("block", "1", definition="number of the block in the session, from 1"),
     Signal("block_name", "", definition="the protocol's name of the block, or else its task's"),

@@ -11,6 +11,7 @@ from typing import Any
 
 from labcrane.core.records import Run
 from labcrane.core.roles import Questionnaire
+from labcrane.design.counts import spans
 from labcrane.design.plan import SessionPlan
 from labcrane.doctor.checks import at_start
 from labcrane.protocol.components import ComponentSpec
@@ -37,7 +38,10 @@ RECORDED_PACKAGES = (
 
 
 def context(visit: Visit, plan: SessionPlan, rig: Rig, run: Run) -> dict[str, Any]:
-    """Return everything that whoever reads the recording must know, ready for JSON."""
+    """Return everything that readers of the recording must know, ready for JSON.
+
+    ``plan`` is the plan of the whole session, also where the session is resumed.
+    """
     return {
         **_of_visit(visit, plan),
         "rate_hz": run.rate_hz,
@@ -47,7 +51,13 @@ def context(visit: Visit, plan: SessionPlan, rig: Rig, run: Run) -> dict[str, An
         # What a simulation records does not depend on the computer that it is made on.
         "doctor": None if visit.fast else at_start(visit.folder.root),
         "plan": [
-            {"block": block.number, "name": block.name, "trials": len(block.trials)}
+            {
+                "block": block.number,
+                "name": block.name,
+                "trials": len(block.trials),
+                "practice": block.practice,
+                "counted": spans(one.number for one in block.trials if one.planned.counted),
+            }
             for block in plan.blocks
         ],
         **_of_tracks(plan),

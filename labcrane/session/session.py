@@ -204,7 +204,7 @@ def _record(
             rig.dynamics.reset(within_limits(study, so_far.angles))
         second = frame_bytes(run) * run.rate_hz
         visit.folder.check_space(plan.expected_s, second, RESERVE_S)
-        about = context(visit, plan, rig, run) | admission.context | scheduling | awake
+        about = context(visit, whole, rig, run) | admission.context | scheduling | awake
         if study.protocol.design.tracks:
             about["carried"] = [asdict(each) for each in carried]
         awaits = (*study.views, *study.sounds) if visit.feedback else ()

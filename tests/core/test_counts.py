@@ -16,12 +16,14 @@ from labcrane.core.records import SessionState, is_done
 from labcrane.design.counts import TrialCounts, numbers, spans
 from labcrane.design.plan import SessionPlan, plan_session
 from labcrane.recording.journal_reader import read_journal
+from labcrane.recording.participant_file.reader import open_recording
 from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.eligibility import EXEMPT
 from labcrane.session.session import outlook, run, still_owed
 from labcrane.session.visit import Visit, check_new
 from labcrane.streams.context import situation_after
 from labcrane.web.state import SessionView
+from labcrane.web.viewer.film import Film
 
 PRACTISED = SHORT.replace(
     "      - block: {task: aiming, pairs: 1}",
@@ -103,6 +105,20 @@ def test_the_record_keeps_the_numbers_of_its_trial_table(visit: Visit) -> None:
     owed = next(event.data["owed"] for event in log.events if event.name == "session.end")
     last = planned(visit).trials[-1].number
     assert owed.endswith(f"-{last}")
+
+
+def test_the_viewer_says_both_numbers_of_a_trial_of_a_resumed_session(visit: Visit) -> None:
+    stopped(visit)
+    file = run(replace(visit, resumed=True), ScriptedConsole())
+    counts = TrialCounts.of(planned(visit))
+    record = open_recording(file).session(1)
+    film = Film(record, "P001")
+    begun = {one["text"].lower().partition(" began")[0] for one in film.events}
+    wanted = {f"{counts.name(number)} ({number} in the tables)" for number in counts.counted}
+    assert wanted <= begun
+    assert any(text.startswith("practice trial 1 (") for text in begun)
+    assert "the way to a trial" in begun
+    assert set(counts.counted) == set(record.trials["trial"][record.trials["practice"] == 0])
 
 
 @pytest.mark.parametrize("outcome", ["repeated", "ended", "interrupted"])

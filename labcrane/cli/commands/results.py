@@ -302,9 +302,11 @@ def view(
         Path | None, typer.Option(help="another participant file, shown at the same second")
     ] = None,
     at: Annotated[float, typer.Option(help="the second to begin at")] = 0.0,
-    trial: Annotated[int | None, typer.Option(help="the trial to begin at instead")] = None,
+    trial: Annotated[
+        int | None, typer.Option(help="begin at this trial instead; its number in the trial table")
+    ] = None,
     beside_trial: Annotated[
-        int | None, typer.Option(help="a trial beside it, both from their starts")
+        int | None, typer.Option(help="show this trial beside it, both from their starts")
     ] = None,
     port: Annotated[int, typer.Option(help="where it is served; 0 takes a free one")] = 0,
 ) -> None:

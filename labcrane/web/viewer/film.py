@@ -19,7 +19,7 @@ from labcrane.core.records import Event, Run, SessionState
 from labcrane.core.roles import Cue
 from labcrane.core.settings import Settings
 from labcrane.core.signals import Layout, signals_of
-from labcrane.design.counts import TableNumbers
+from labcrane.design.counts import TrialCounts
 from labcrane.errors import LabcraneError, RecordingError
 from labcrane.files.yaml import parse_yaml
 from labcrane.machines.links import link_boxes
@@ -128,6 +128,7 @@ class Film:
             state=self._layout("state"),
             task=self._layout("task"),
         )
+        self._counts = TrialCounts.recorded(context.get("plan", ()))
         self._window = (0, 0)
         self._rows: dict[str, FloatArray] = {}
         self._reading = Lock()  # each curve is asked for by a thread of its own
@@ -186,15 +187,22 @@ class Film:
     @cached_property
     def events(self) -> list[dict[str, Any]]:
         """What happened, in words, ready for JSON."""
-        called = TableNumbers().name
         found = []
         for event in self._happened[:MOST_EVENTS]:
-            said = sentence(event, called)
+            said = sentence(event, self._called)
             found.append(
                 {"t": round(event.time - self.start, 4), "text": said.text, "kind": said.kind,
                  "level": said.level}
             )  # fmt: skip
         return found
+
+    def _called(self, number: int) -> str:
+        """Return what screens called a trial, and its number in the tables where that differs."""
+        counts = self._counts
+        if number not in counts.counted and number not in counts.practice:
+            return counts.name(number) if counts.total else f"trial {number}"
+        name = counts.name(number)
+        return name if counts.counted.get(number) == number else f"{name} ({number} in the tables)"
 
     @cached_property
     def trials(self) -> list[dict[str, Any]]:
@@ -243,7 +251,6 @@ class Film:
 
         One that has not ended lasts until the end of the session.
         """
-        called = TableNumbers().name
         found: list[dict[str, Any]] = []
         lasting: dict[tuple[str, Any], dict[str, Any]] = {}
         ends = dict(BREAKS.values())
@@ -254,7 +261,7 @@ class Film:
                 key = end, event.data.get(whose)
                 if key not in lasting:
                     kind = "paused" if event.name == "pause.start" else "lost"
-                    text = sentence(event, called).text
+                    text = sentence(event, self._called).text
                     lasting[key] = {"from": at, "to": self.length, "kind": kind, "text": text}
                     found.append(lasting[key])
             elif event.name in ends:
