@@ -3,6 +3,7 @@
 # ruff: noqa: E501 - a case is one line
 
 import json
+import re
 from pathlib import Path
 from random import Random
 from shutil import copytree
@@ -541,7 +542,7 @@ def test_a_rehearsal_finds_what_a_check_cannot(
     assert not (tmp_path / "study.lock.json").exists()
 
 
-def test_what_is_approved_or_amended_was_rehearsed(
+def test_nothing_is_locked_or_amended_while_something_is_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     cue = tmp_path / "plugins" / "broken.py"
@@ -552,14 +553,29 @@ def test_what_is_approved_or_amended_was_rehearsed(
     study = a_study(tmp_path, ("sessions:", "feedback: {ball: {use: broken}}\nsessions:"), slow)
     path, lock = str(study.path), tmp_path / "study.lock.json"
     granted = ["--board", "B", "--reference", "R", "--valid-until", "2099-01-01"]
-    assert main(["approve", path, *granted, "--consent", str(tmp_path / "consent.md")]) == 0
-    said = capsys.readouterr().err
-    assert ":4:10: question: rate_hz is 10 Hz" in said  # nobody asks again once it is locked
+    granted += ["--consent", str(tmp_path / "consent.md")]
+    amendment = ["amend", path, "--why", "another cue", "--reference", "R2"]
+
+    def refused(*words: str) -> str:
+        assert main(words) == 2
+        return " ".join(capsys.readouterr().err.split())
+
+    said = refused("approve", path, *granted)
+    assert ":4:10: question: rate_hz is 10 Hz" in said
+    assert said.endswith("nothing was locked: answer what is asked above first")
+    assert not lock.exists()
+    asking = study.path.read_text()
+    keys = re.findall(r"if it is, write expected: \[(.+?)\]", said)
+    assert len(keys) == said.count(": question: ") > 0
+    answered = asking.replace("rate_hz: 10", f"rate_hz: 10\nexpected: {keys}")
+    study.path.write_text(answered)
+    assert main(["approve", path, *granted]) == 0
     locked = lock.read_text()
+    study.path.write_text(asking)
+    assert ":4:10: question: rate_hz is 10 Hz" in refused(*amendment)
+    study.path.write_text(answered)
     cue.write_text(BROKEN)
-    capsys.readouterr()
-    assert main(["amend", path, "--why", "another cue", "--reference", "R2"]) == 2
-    assert "rehearsal, session 'only': cue 'ball'" in " ".join(capsys.readouterr().err.split())
+    assert "rehearsal, session 'only': cue 'ball'" in refused(*amendment)
     assert lock.read_text() == locked
 
 

@@ -21,7 +21,10 @@ def approve(
     valid_until: Annotated[str, typer.Option(help="last day on which people may take part")],
     consent: Annotated[Path, typer.Option(help="the consent text, in the protocol's folder")],
 ) -> None:
-    """Lock a protocol, with everything it refers to, as approved; it is rehearsed before."""
+    """Rehearse a protocol and lock it, with everything it refers to, as approved.
+
+    Nothing is locked while check or the rehearsal asks something.
+    """
     from labcrane.approval import decision
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
@@ -42,12 +45,21 @@ def approve(
 
 
 def _rehearse(study: "Study") -> None:
-    """Rehearse a study, and say what is asked of it: nobody asks again after it is locked."""
+    """Rehearse a study that is to be locked: to answer a question later is an amendment.
+
+    Raises
+    ------
+    ProtocolError
+        Something is asked of the study.
+    """
     from labcrane.protocol.questions import about, questions
     from labcrane.simulation.rehearsal import rehearse
 
-    for each in (*questions(study), *rehearse(study).questions):
-        typer.echo(about(study, each)["whole"], err=True)
+    open_ones = (*questions(study), *rehearse(study).questions)
+    if open_ones:
+        asked = [about(study, each)["whole"] for each in open_ones]
+        last = "nothing was locked: answer what is asked above first"
+        raise ProtocolError("\n".join([*asked, last]))
 
 
 def amend(
