@@ -26,7 +26,8 @@ from labcrane.analysis.report.factors import (
 )
 from labcrane.analysis.report.outcomes import SEQUENCE
 from labcrane.analysis.statistics.anova import compare
-from labcrane.analysis.statistics.trends import linear_trend, mixed_model
+from labcrane.analysis.statistics.mixed import NoModelError, mixed_model
+from labcrane.analysis.statistics.trends import linear_trend
 from labcrane.errors import ProtocolError
 from labcrane.simulation.power import (
     DIFFERENCE,
@@ -231,8 +232,11 @@ def names(planned: PlannedTest) -> list[str]:
             return [outcomes.named_factor(each, factors) for each in there if each in results]
         case "trend":
             return [SEQUENCE]
-    model = mixed_model(results.assign(sequence=results[PLACE]), measure)
-    return [] if model is None else [str(each) for each in model.terms["term"][1:]]
+    try:
+        model = mixed_model(results.assign(sequence=results[PLACE]), measure)
+    except NoModelError:
+        return []
+    return [str(each) for each in model.terms["term"][1:]]
 
 
 def column(factor: str, factors: Factors) -> str:
@@ -276,14 +280,15 @@ def _trend(planned: PlannedTest, results: "pd.DataFrame") -> ReportedTest:
 
 
 def _mixed(planned: PlannedTest, results: "pd.DataFrame") -> ReportedTest:
-    model = mixed_model(results.assign(sequence=results[PLACE]), planned.effect.measure)
-    if model is None or not model.converged:
+    try:
+        model = mixed_model(results.assign(sequence=results[PLACE]), planned.effect.measure)
+    except NoModelError:
         return NOTHING
     own = model.terms[model.terms["term"] == planned.effect.factor]
     if own.empty:
         return NOTHING
-    p, estimate, error = own[["p", "estimate", "se"]].to_numpy(float)[0].tolist()
-    return ReportedTest(p, estimate, error, np.inf)
+    p, estimate, error, freedom = own[["p", "estimate", "se", "df"]].to_numpy(float)[0].tolist()
+    return ReportedTest(p, estimate, error, freedom)
 
 
 ASKED: Mapping[Kind, Callable[[PlannedTest, "pd.DataFrame"], ReportedTest]] = {

@@ -10,9 +10,10 @@ import pytest
 from labcrane.analysis.report import outcomes
 from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.statistics.anova import analyse
+from labcrane.analysis.statistics.mixed import NoModelError, mixed_model
 from labcrane.analysis.statistics.reported import Reported, check_reported
 from labcrane.analysis.statistics.time_outs import median_time
-from labcrane.analysis.statistics.trends import holm, linear_trend, mixed_model
+from labcrane.analysis.statistics.trends import holm, linear_trend
 from results.consumers import needs_emmeans, needs_r, r, table
 from results.synthetic import cohort_of_36
 
@@ -95,14 +96,12 @@ def test_the_mixed_model_is_that_of_lme4(
     movements: pd.DataFrame, in_r: dict[str, list[str]]
 ) -> None:
     model = mixed_model(movements, "movement_time")
-    assert model is not None
-    assert model.slopes
-    assert model.converged
+    assert not model.boundary
     named = ["Intercept", "sequence", "difficulty", "far_side[T.right]"]
     terms = model.terms.set_index("term").loc[named]
-    np.testing.assert_allclose(terms["estimate"], np.array(in_r["fixed"], float), rtol=1e-3)
-    np.testing.assert_allclose(terms["se"], np.array(in_r["se"], float), rtol=5e-3)
-    assert model.residual_sd == pytest.approx(float(in_r["sigma"][0]), rel=1e-3)
+    np.testing.assert_allclose(terms["estimate"], np.array(in_r["fixed"], float), rtol=2e-5)
+    np.testing.assert_allclose(terms["se"], np.array(in_r["se"], float), rtol=1e-4)
+    assert model.residual_sd == pytest.approx(float(in_r["sigma"][0]), rel=1e-5)
 
 
 def test_the_papers_movement_time_is_consistent_and_its_accuracy_is_not() -> None:
@@ -145,7 +144,8 @@ def test_two_participants_are_not_tested(movements: pd.DataFrame) -> None:
     two = movements[movements["participant"] <= "P002"]
     assert analyse(two, "movement_time", ["sequence"]) == []
     assert linear_trend(two, "movement_time") is None
-    assert mixed_model(two, "movement_time") is None
+    with pytest.raises(NoModelError, match="2 participants have a value, and 3 are needed"):
+        mixed_model(two, "movement_time")
     assert anova_table(two).empty
     assert trend_table(two).empty
 
@@ -213,7 +213,6 @@ def test_the_mixed_model_of_the_time_from_circle_to_circle_is_that_of_lme4(
     with_dwell: pd.DataFrame, primaries: dict[str, list[str]]
 ) -> None:
     model = mixed_model(with_dwell, "circle_to_circle")
-    assert model is not None
     named = ["Intercept", "sequence", "difficulty", "far_side[T.right]"]
     terms = model.terms.set_index("term").loc[named]
     np.testing.assert_allclose(terms["estimate"], np.array(primaries["fixed"], float), rtol=1e-3)
@@ -466,16 +465,20 @@ def test_positions_that_cannot_be_told_from_pairs_are_not_tested_beside_them() -
     assert one == plain
 
 
-SIGNED = """
-suppressMessages(library(lme4))
+LMERTEST = """
+suppressMessages(library(lmerTest))
 d <- read.csv(commandArgs(TRUE)[1])
 say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
-d$s <- d$sequence - mean(d$sequence); d$b <- d$difficulty - mean(d$difficulty)
-for (y in c("error_along", "sparc")) {
-  d$y <- d[[y]]
-  mm <- lmer(y ~ s + b + far_side + group + phase + group:s + group:phase + (1 | participant), d,
-             control = lmerControl(optCtrl = list(ftol_abs = 1e-12, xtol_abs = 1e-12)))
-  say(y, fixef(mm)); say(paste(y, "se"), sqrt(diag(as.matrix(vcov(mm)))))
+for (cohort in unique(d$cohort)) {
+  own <- d[d$cohort == cohort, ]
+  own$s <- own$sequence - mean(own$sequence); own$b <- own$difficulty - mean(own$difficulty)
+  mm <- suppressWarnings(suppressMessages(lmer(
+    y ~ s + b + far_side + group + phase + group:s + group:phase + (1 + s | participant), own,
+    control = lmerControl(optimizer = "bobyqa", optCtrl = list(rhoend = 1e-9)))))
+  found <- coef(summary(mm)); key <- function(name) paste(cohort, name)
+  say(key("estimate"), found[, "Estimate"]); say(key("se"), found[, "Std. Error"])
+  say(key("df"), found[, "df"]); say(key("p"), found[, "Pr(>|t|)"])
+  say(key("fit"), REMLcrit(mm), isSingular(mm))
 }
 """
 IN_R = (
@@ -500,34 +503,100 @@ def two_groups() -> pd.DataFrame:
     return both
 
 
+def awkward(cohort: int) -> pd.DataFrame:
+    """Return a cohort of people who differ or not, some of whose movements are not there."""
+    dice = np.random.default_rng([11, cohort])
+    people, places = int(dice.integers(6, 16)), 12
+    of_mean, of_slope = dice.choice([0.0, 0.1, 0.5]), dice.choice([0.0, 0.01, 0.05])
+    rows = []
+    for who in range(people):
+        mean, slope = dice.normal(0.0, of_mean), dice.normal(0.0, of_slope)
+        for phase in ("first", "second"):
+            for place in range(places):
+                hard = float(dice.choice([3.0, 3.6, 4.2, 4.6]))
+                side = str(dice.choice(["left", "right"]))
+                group = "visual" if who % 2 else "none"
+                both = 0.2 * (group == "visual" and phase == "second")
+                y = mean + slope * place + 0.1 * hard + both + dice.normal(0.0, 0.2)
+                rows.append((f"P{who:03}", group, phase, place + 1.0, hard, side, y))
+    names = ["participant", "group", "phase", "sequence", "difficulty", "far_side", "y"]
+    kept = pd.DataFrame(rows, columns=names)
+    return kept.sample(frac=float(dice.choice([0.5, 0.8, 1.0])), random_state=cohort)
+
+
 @pytest.mark.slow
 @needs_r
-@pytest.mark.parametrize("measure", ["error_along", "sparc"])
-def test_a_measure_with_a_sign_is_modelled_whole_with_group_by_phase_as_lme4_does(
-    two_groups: pd.DataFrame, tmp_path: Path, measure: str
+def test_the_mixed_model_is_that_of_lmertest_in_cohorts_of_any_kind(
+    two_groups: pd.DataFrame, tmp_path: Path
 ) -> None:
+    signed = [
+        two_groups.rename(columns={name: "y"}).assign(cohort=name)
+        for name in ("error_along", "sparc")
+    ]
+    cohorts = [*signed, *(awkward(at).assign(cohort=f"drawn {at}") for at in range(24))]
     path = tmp_path / "movements.csv"
-    two_groups.to_csv(path, index=False)
-    theirs = table(r(SIGNED, path))
-    model = mixed_model(two_groups, measure)
-    assert model is not None
-    assert (model.log, model.n, model.missing) == (False, len(two_groups), 0)
-    assert (two_groups[measure] <= 0.0).any()
-    assert not model.slopes, "they are alike in everybody here"
-    terms = model.terms.set_index("term").loc[list(IN_R)]
-    fixed, se = (np.array(theirs[key], float) for key in (measure, f"{measure} se"))
-    np.testing.assert_allclose(terms["estimate"], fixed, rtol=1e-3, atol=1e-6)
-    np.testing.assert_allclose(terms["se"], se, rtol=5e-3)
-    if measure == "error_along":
-        group_by_phase = terms["estimate"].iloc[-1]
-        assert group_by_phase == pytest.approx(0.06, abs=3 * terms["se"].iloc[-1])
+    names = ["cohort", "participant", "group", "phase", "sequence", "difficulty", "far_side", "y"]
+    pd.concat(cohorts)[names].to_csv(path, index=False)
+    theirs = {key: np.array(found, float) for key, found in table(r(LMERTEST, path)).items()}
+    singular = 0
+    for own in cohorts:
+        name = own["cohort"].iloc[0]
+        model = mixed_model(own, "y")
+        assert (model.log, model.n, model.missing) == (False, len(own), 0)
+        criterion, is_singular = theirs[f"{name} fit"]
+        # Near a boundary lmer stops early in some; ours may be a better fit, never a worse one.
+        assert model.criterion < criterion + 1e-6, name
+        singular += model.boundary
+        if model.criterion < criterion - 1e-6:
+            continue
+        assert model.boundary == is_singular, name
+        terms = model.terms.set_index("term").loc[list(IN_R)]
+        off = np.abs(terms["estimate"] - theirs[f"{name} estimate"]) / theirs[f"{name} se"]
+        assert off.max() < 2e-3, name
+        np.testing.assert_allclose(terms["se"], theirs[f"{name} se"], rtol=2e-3, err_msg=name)
+        np.testing.assert_allclose(terms["df"], theirs[f"{name} df"], rtol=2e-2, err_msg=name)
+        np.testing.assert_allclose(terms["p"], theirs[f"{name} p"], atol=1e-3, err_msg=name)
+    assert 0 < singular < len(cohorts), "both kinds are drawn"
+
+
+@pytest.mark.slow
+def test_a_term_that_is_not_there_is_found_as_often_as_its_p_says() -> None:
+    found = [
+        mixed_model(awkward(at), "y").terms.set_index("term")["p"]["group[T.visual]:sequence"]
+        for at in range(100, 160)
+    ]
+    assert sum(p < 0.05 for p in found) <= 8  # 3 are expected; 9 or more come in one of 250 tries
+    assert 0.3 < float(np.median(found)) < 0.7
+
+
+@pytest.mark.parametrize("value", [0.0, 0.1, 0.1 + 0.2, 7.3])
+@pytest.mark.parametrize("missing", [0, 9])
+def test_a_measure_that_is_the_same_in_all_is_tested_by_nothing(
+    two_groups: pd.DataFrame, value: float, missing: int
+) -> None:
+    few = two_groups[two_groups["participant"] <= "P008"].reset_index(drop=True)
+    few = few.assign(session=few["phase"].map({"first": 1.0, "second": 2.0}))
+    constant = pd.Series(value, few.index)
+    constant[np.random.default_rng(5).choice(few.index, missing, replace=False)] = np.nan
+    table = with_factors(few.drop(columns="phase").assign(constant=constant, practice=0.0))
+    factors, asked = factors_of(table), ["constant"]
+    for made in (
+        outcomes.anova_table(table, factors, asked),
+        outcomes.contrast_table(table, factors, asked),
+        outcomes.trend_table(table, factors, asked),
+        *outcomes.time_scale_tables(table, factors, asked),
+    ):
+        assert set(made["measure"]) - {"constant"}, "other measures are tested"
+        own = made[made["measure"] == "constant"]
+        assert own["p"].isna().all()
+    with pytest.raises(NoModelError, match="all movements have the same value"):
+        mixed_model(table, "constant")
 
 
 def test_a_time_of_0_is_kept_and_the_time_modelled_as_it_is(two_groups: pd.DataFrame) -> None:
     few = two_groups[two_groups["participant"] <= "P006"].reset_index(drop=True)
     zero = few.assign(reaction_time=few["movement_time"].where(few.index != 5, 0.0))
     model = mixed_model(zero, "reaction_time")
-    assert model is not None
     assert (model.log, model.n) == (False, len(few))
     assert mixed_model(few.assign(reaction_time=few["movement_time"]), "reaction_time").log
 
@@ -542,3 +611,4 @@ def test_groups_that_lack_a_phase_are_modelled_without_their_interaction(
     model = mixed_model(lacking, "movement_time")
     assert "phase[T.second]" in set(model.terms["term"])
     assert "group[T.visual]:phase[T.second]" not in set(model.terms["term"])
+    assert model.dropped == ("group[T.visual]:phase[T.second]",)

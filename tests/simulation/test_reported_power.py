@@ -272,7 +272,7 @@ def test_the_planned_test_is_the_one_that_the_report_prints(kind: str, text: str
     """Of everybody: the p of the report's own table."""
     from labcrane.analysis.report import outcomes
     from labcrane.analysis.report.factors import factors_of, with_factors
-    from labcrane.analysis.statistics.trends import mixed_model
+    from labcrane.analysis.statistics.mixed import mixed_model
 
     table = movements(24, sessions=2, difference=0.5, slope=-0.1)
     effect = read_effect(text)

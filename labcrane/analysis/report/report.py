@@ -1,6 +1,7 @@
 """The report of a study: one page, one page per participant, figures and tables."""
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,9 +41,9 @@ from labcrane.analysis.report.words import STYLES, UNBALANCED, Results, confound
 from labcrane.analysis.statistics.errors import errors
 from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
+from labcrane.analysis.statistics.mixed import TIMES, MixedModel, NoModelError, mixed_model
 from labcrane.analysis.statistics.time_outs import time_outs
 from labcrane.analysis.statistics.time_scales import QUANTITIES, TAKEN
-from labcrane.analysis.statistics.trends import TIMES, mixed_model
 from labcrane.analysis.tables.annotations import annotations_of
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.errors import LabcraneError
@@ -500,23 +501,41 @@ def _unmeasured(page: Page, streams: "pd.DataFrame") -> None:
 
 
 def _mixed(page: Page, results: "pd.DataFrame", measure: str) -> None:
-    model = mixed_model(results, measure)
-    if model is None:
-        page.say(f"No mixed model of {measure} could be fitted.")
+    try:
+        model = mixed_model(results, measure)
+    except NoModelError as error:
+        page.say(f"No mixed model of {measure}: {error}.")
         return
-    slopes = "with" if model.slopes else "without (the data could not carry them)"
-    modelled = f"the logarithm of {measure}" if model.log else measure
-    without = f" ({model.missing} more have no value)" if model.missing else ""
-    why = ""
-    if measure in TIMES and not model.log:
-        why = " It is modelled as it is, since a value of 0 or less has no logarithm."
-    page.say(
-        f"Mixed model of {modelled}: {model.n} movements{without} of {model.participants} "
-        f"participants, {slopes} a slope for each participant; standard deviation over "
-        f"participants {model.participant_sd:.3g}, residual {model.residual_sd:.3g}; p are of z, "
-        f"which is too small with few participants.{why}"
-    )
+    page.say(" ".join(_of_model(model)))
     page.table(f"mixed_model_{measure}", model.terms)
+
+
+def _of_model(model: MixedModel) -> Iterator[str]:
+    """Yield in sentences what was modelled, and what of it could not be."""
+    modelled = f"the logarithm of {model.measure}" if model.log else model.measure
+    without = f" ({model.missing} more have no value)" if model.missing else ""
+    slopes = not math.isnan(model.slope_sd)
+    spread = f", of slopes {model.slope_sd:.3g}" if slopes else ""
+    yield (
+        f"Mixed model of {modelled}: {model.n} movements{without} of {model.participants} "
+        f"participants, {'with' if slopes else 'without'} a slope for each participant; standard "
+        f"deviation over participants of intercepts {model.participant_sd:.3g}{spread}, residual "
+        f"{model.residual_sd:.3g}; degrees of freedom after Satterthwaite."
+    )
+    if model.measure in TIMES and not model.log:
+        yield "It is modelled as it is, since a value of 0 or less has no logarithm."
+    if model.boundary:
+        yield (
+            "The fit is at a boundary (singular): intercepts and slopes of participants do not "
+            "both vary by themselves."
+        )
+    if model.reference:
+        yield (
+            f"Terms without a group are those of the first one, {model.reference}; terms with a "
+            "group are differences from it."
+        )
+    for name in model.dropped:
+        yield f"{name} is not in it: it cannot be told from the other terms here."
 
 
 def _syncs(page: Page, syncs: "pd.DataFrame") -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane.analysis.statistics.confounding import dummies
+from labcrane.analysis.statistics.rounding import alike, without_rounding
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -175,7 +176,9 @@ def quantities(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
                     rows.append({**about, "quantity": name, "value": value, "adjustment": word})
             before, last_before, session_before = mean, last, sessions[phase]
     names = ["participant", "group", "phase", "quantity", "value", "adjustment"]
-    return pd.DataFrame(rows, columns=names)
+    table = pd.DataFrame(rows, columns=names)
+    values = without_rounding(table["value"].to_numpy(float), known["value"].to_numpy(float))
+    return table.assign(value=values)
 
 
 def adjusted(found: "pd.DataFrame") -> str:
@@ -214,7 +217,7 @@ def summary(found: "pd.DataFrame", measure: str, people: Mapping[str, str]) -> "
                 why = APART
             elif len(values) < LEAST:
                 why = f"{len(values)} of {len(who)} people have it, and {LEAST} are needed"
-            elif np.ptp(values) == 0.0:
+            elif alike(values):
                 why = "all have the same"
             row = {"measure": measure, "phase": phase, "quantity": quantity, "group": group}
             row |= {"adjustment": word, "n": len(values), "left_out": " ".join(gone), "why": why}

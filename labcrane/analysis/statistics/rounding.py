@@ -1,0 +1,26 @@
+"""What rounding leaves of numbers that are equal: no test is made of it."""
+
+import numpy as np
+
+from labcrane.types import FloatArray
+
+ROUNDING = 1e-10
+"""Share of the largest number; a difference below it comes of rounding."""
+
+
+def alike(values: FloatArray) -> bool:
+    """Return whether all values are equal, but for rounding."""
+    return bool(np.ptp(values) <= ROUNDING * np.abs(values).max())
+
+
+def without_rounding(differences: FloatArray, of: FloatArray) -> FloatArray:
+    """Return differences of values, with 0 in place of what rounding left of equal ones.
+
+    Parameters
+    ----------
+    differences
+        Any differences, slopes or means of differences.
+    of
+        The values that they are worked out of, which give the scale.
+    """
+    return np.where(np.abs(differences) <= ROUNDING * np.abs(of).max(initial=0.0), 0.0, differences)
