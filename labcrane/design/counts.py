@@ -50,7 +50,7 @@ class TrialCounts:
         """
         found: dict[bool, list[int]] = {False: [], True: []}
         for block in blocks:
-            found[bool(block.get("practice"))] += numbers(str(block.get("counted", "")))
+            found[bool(block.get("practice"))] += block.get("counted", ())
         counted, practice = found[False], found[True]
         return cls(
             {number: place for place, number in enumerate(counted, start=1)},
@@ -96,7 +96,7 @@ def _trials(wanted: Sequence[int]) -> str:
     return f"trial{'s' if len(wanted) > 1 else ''} {spans(wanted)}"
 
 
-def spans(wanted: Iterable[int]) -> str:
+def spans(wanted: Sequence[int]) -> str:
     """Return whole numbers as text: ``1-3 5``."""
     found = sorted(set(wanted))
     gaps = [at for at, (one, two) in enumerate(pairwise(found), start=1) if two > one + 1]

@@ -75,8 +75,13 @@ _OWN = ("context", "protocol", "header", "machine", "sync_report", "README", "CI
 """Texts of a participant file that no participant and no examiner writes."""
 
 
+_NUMBERS = (" owed", " repeats", " void")
+"""Ends of places of events at which a program says which trials: 5-6 8-9 11-12."""
+
+
 def _is_written(place: str) -> bool:
-    return not any(own in place.rsplit("/", maxsplit=1)[-1] for own in _OWN)
+    name = place.rsplit("/", maxsplit=1)[-1]
+    return not place.endswith(_NUMBERS) and not any(own in name for own in _OWN)
 
 
 def _texts(path: Path) -> Iterator[tuple[str, str]]:
@@ -132,7 +137,7 @@ def _hdf5_texts(path: Path) -> Iterator[tuple[str, str]]:
                      for key, value in node.attrs.items() if isinstance(value, str))  # fmt: skip
         if isinstance(node, h5py.Dataset) and node.dtype.kind in "OS":
             for value in np.atleast_1d(node.asstr("utf-8")[()]).ravel().tolist():
-                found.extend((name, leaf) for _, leaf in _leaves(name, str(value)))
+                found.extend(_leaves(name, str(value)))
 
     with h5py.File(path, "r") as file:
         file.visititems(look)

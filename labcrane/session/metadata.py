@@ -11,7 +11,6 @@ from typing import Any
 
 from labcrane.core.records import Run
 from labcrane.core.roles import Questionnaire
-from labcrane.design.counts import spans
 from labcrane.design.plan import SessionPlan
 from labcrane.doctor.checks import at_start
 from labcrane.protocol.components import ComponentSpec
@@ -56,7 +55,7 @@ def context(visit: Visit, plan: SessionPlan, rig: Rig, run: Run) -> dict[str, An
                 "name": block.name,
                 "trials": len(block.trials),
                 "practice": block.practice,
-                "counted": spans(one.number for one in block.trials if one.planned.counted),
+                "counted": [one.number for one in block.trials if one.planned.counted],
             }
             for block in plan.blocks
         ],

@@ -135,6 +135,19 @@ def test_nothing_is_written_with_anything_personal_in_it(
     assert list(out.iterdir()) == []
 
 
+def test_numbers_of_trials_are_no_telephone_number_and_a_note_of_one_is(tmp_path: Path) -> None:
+    file, written = tmp_path / "P001.h5", "5-6 8-9 11-12 14-15"
+    for key, found in (
+        ("repeats", []),
+        ("void", []),
+        ("owed", []),
+        ("note", ["a telephone number"]),
+    ):
+        with h5py.File(file, "w") as made:
+            made["ses-01/events/data"] = [json.dumps({"trial": 3, key: written}).encode()]
+        assert [each.partition(": ")[2] for each in personal_in(file)] == found
+
+
 @pytest.mark.slow
 def test_names_of_computers_are_taken_out_of_the_recordings(
     electrodes: Cohort, tmp_path: Path
