@@ -99,6 +99,46 @@ def test_conditions_in_one_order_for_everybody_cannot_be_told_from_it() -> None:
     assert of_condition(outcomes.contrast_table, alike)["confounded"] == said
 
 
+def test_three_conditions_of_people_who_all_had_one_order_are_confounded_whoever_else_began() -> (
+    None
+):
+    movements = crossover(4, 9, ("a", "b", "c"))
+    turned = movements["participant"].str[1:].astype(int) % 3 > 0
+    movements = movements[~(turned & (movements["block"] == 3))]  # they did not come to the end
+    said = "the order in which conditions came"
+    row = of_condition(outcomes.anova_table, movements)
+    assert (row["n"], row["confounded"]) == (3, said)
+    contrasts = outcomes.contrast_table(movements, factors_of(movements))
+    own = contrasts[contrasts["factor"] == "condition"]
+    assert set(own["confounded"]) == {said}
+
+
+def test_what_comes_with_each_block_in_everybody_is_named_beside_its_change() -> None:
+    alike = crossover(2, 10, ("plain", "tone"), balanced=False)
+    factors = factors_of(alike)
+    of_blocks = outcomes.anova_table(alike, factors).set_index("factor")
+    assert of_blocks.loc["block", "confounded"] == "conditions"
+    contrasts = outcomes.contrast_table(alike, factors).set_index("factor")
+    assert contrasts.loc["block", "confounded"] == "conditions"
+    scales, _ = outcomes.time_scale_tables(alike, factors)
+    change = scales[(scales["quantity"] == "change") & (scales["measure"] == "movement_time")]
+    assert set(change["confounded"]) == {"conditions"}
+    slope = scales[scales["quantity"] == "slope"]
+    assert set(slope["confounded"]) == {""}
+    even = crossover(2, 10, ("plain", "tone"))
+    rows = outcomes.anova_table(even, factors_of(even)).set_index("factor")
+    assert rows.loc["block", "confounded"] == ""
+    wide = crossover(5, 8, ("plain",))
+    longer = wide["movement_time"] + np.random.default_rng(5).normal(1.0, 0.2, len(wide))
+    narrow = wide.assign(block=2, block_name="narrow", width=0.3, feedback="ball", distance=3.0)
+    narrow = narrow.assign(movement_time=longer)
+    both = pd.concat([wide.assign(width=0.8, feedback="none"), narrow], ignore_index=True)
+    both = with_factors(both.drop(columns=["condition", "phase", "place"]))
+    rows = outcomes.anova_table(both, factors_of(both)).set_index("factor")
+    said = "feedback and the targets' distance and the targets' width"
+    assert rows.loc["block", "confounded"] == said
+
+
 @pytest.mark.parametrize("people", range(4, 13))
 def test_orders_that_were_not_had_equally_often_are_told_with_their_numbers(people: int) -> None:
     names = ("a", "b", "c")
@@ -130,6 +170,9 @@ def test_who_lacks_a_condition_does_not_count_in_whether_orders_are_even() -> No
     both = gone | ((movements["participant"] == "P004") & (movements["condition"] == "tone"))
     assert factors_of(movements[~both]).uneven == ""
     assert factors_of(crossover(2, 9, ("plain", "tone"), balanced=False)).uneven == ""
+    failed = movements["outcome"].mask(gone, "time_out")
+    said = factors_of(movements.assign(outcome=failed)).uneven
+    assert "plain for 5 and tone for 4 participants" in said
 
 
 def test_power_tests_the_difference_of_conditions_as_the_report_does() -> None:

@@ -74,6 +74,17 @@ def test_throughput_is_the_mean_of_means_with_the_true_spread() -> None:
     assert set(table["pooled"]) == {"no"}
 
 
+def test_throughput_is_of_each_distance_and_width_by_itself() -> None:
+    slow = {0.3: 7.0, 0.8: 3.0}
+    parts = [
+        movements(4000, spread=width / WIDTH_FACTOR, seed=seed).assign(width=width, movement_time=s)
+        for seed, (width, s) in enumerate(slow.items())
+    ]
+    bits = [math.log2(d / width + 1.0) / s for d in (2.0, 4.0) for width, s in slow.items()]
+    found = throughput(pd.concat(parts, ignore_index=True))["throughput"].to_numpy()
+    assert found == pytest.approx(np.mean(bits), rel=0.01)
+
+
 def test_throughput_is_of_mean_times_so_that_their_scatter_does_not_raise_it() -> None:
     table = movements(4000, spread=0.1)
     even = throughput(table)["throughput"].to_numpy()

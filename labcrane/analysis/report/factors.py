@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from labcrane.analysis.quality import is_result
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -171,7 +173,7 @@ def factors_of(table: "pd.DataFrame", people: Mapping[str, str] | None = None) -
         people = dict(zip(map(str, first["participant"]), map(str, first[GROUP]), strict=True))
     practice = len(counted) < len(table)
     own = conditions_in(counted)
-    uneven = _uneven(counted, own) if own else ""
+    uneven = _uneven(counted[is_result(counted)], own) if own else ""
     return Factors(
         several, phases, kind, places, practice, targets, crossed, dict(people), own, uneven
     )
@@ -185,13 +187,14 @@ def conditions_in(table: "pd.DataFrame") -> tuple[str, ...]:
     return tuple(sorted(named)) if len(named) > 1 else ()
 
 
-def _uneven(counted: "pd.DataFrame", conditions: tuple[str, ...]) -> str:
+def _uneven(results: "pd.DataFrame", conditions: tuple[str, ...]) -> str:
     """Return the first phase in which some conditions had more people than others, in a sentence.
 
-    Of those who had all conditions. What people learn from phase to phase is then in part in the
-    differences between conditions. Where all had one order, tests say that it is confounded.
+    Of those who have results of all conditions, and so are in their test. What people learn from
+    phase to phase is then in part in the differences between conditions. Where all had one order,
+    tests say that it is confounded.
     """
-    had = counted[counted[CONDITION].isin(conditions)]
+    had = results[results[CONDITION].isin(conditions)]
     had = had.drop_duplicates(["participant", PHASE, CONDITION])
     whole = had.groupby("participant")[CONDITION].nunique() == len(conditions)
     had = had[had["participant"].isin(whole[whole].index)]

@@ -266,7 +266,8 @@ def throughputs(table: "pd.DataFrame") -> Drawing:
     """Draw each participant's throughput, the least at the bottom, each on a line of its own."""
     mean, count = float(table["throughput"].mean()), len(table)
     caption = (
-        f"Throughput: mean of means. Dots: each participant, n = {count} {_people(count)}; "
+        f"Throughput: mean over distances and widths of targets. Dots: each participant, "
+        f"n = {count} {_people(count)}; "
         f"line: their mean, {mean:.3f} bit/s."
     )
     return Lines("throughput", caption, (), table)

@@ -1,6 +1,6 @@
 """Outcomes of a study in its design: tests, contrasts, time scales, questionnaires."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,13 @@ from labcrane.analysis.report.factors import (
 from labcrane.analysis.statistics.anova import Anova, Contrast, analyse, compare
 from labcrane.analysis.statistics.anova import word as word  # noqa: PLC0414 - of levels, here too
 from labcrane.analysis.statistics.confounding import told_apart
-from labcrane.analysis.statistics.time_scales import TAKEN, adjusted, quantities, summary
+from labcrane.analysis.statistics.time_scales import (
+    FROM_BEFORE,
+    TAKEN,
+    adjusted,
+    quantities,
+    summary,
+)
 from labcrane.analysis.statistics.trends import Trend, holm, linear_trend
 
 if TYPE_CHECKING:
@@ -37,10 +43,23 @@ ADJUSTED = f" with {TAKEN}"
 
 SEQUENCE = "sequence"
 
+Confusable = tuple[tuple[str, tuple[str, ...]], ...]
+"""What an effect may not be told from: each in words, and its columns."""
+
 PAIRS = "pairs of targets"
-ORDER = ("the order in which conditions came", (PHASE,))
-POSITIONS = ("positions", (PHASE, PLACE))
-"""What an effect may not be told from: positions hold learning, and pairs their distance."""
+ORDER: Confusable = (("the order in which conditions came", (PHASE,)),)
+POSITIONS: Confusable = (("positions", (PHASE, PLACE)),)
+"""Positions hold learning, and pairs their distance."""
+
+BESIDE_PHASES: Confusable = (
+    ("conditions", (CONDITION,)),
+    ("feedback", ("feedback",)),
+    ("the targets' distance", (DISTANCE,)),
+    ("the targets' width", ("width",)),
+)
+"""What may change from one session or block to the next in everybody, beside what is learnt."""
+
+OF_PHASES = {PHASE, SESSION, BLOCK, CONDITION}
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,14 +77,14 @@ class Plan:
     phase
         The only one whose movements are in it; empty for all.
     confusable
-        What the effect may not be told from, in words, and its columns; empty for nothing.
+        What the effect may not be told from.
     """
 
     within: tuple[str, ...]
     asked: tuple[str, ...] = ()
     beside: str = ""
     phase: str = ""
-    confusable: tuple[str, tuple[str, ...]] = ("", ())
+    confusable: Confusable = ()
 
     @property
     def suffix(self) -> str:
@@ -78,16 +97,36 @@ class Plan:
             results = results[results[CONDITION].fillna("") != ""]
         return results[results[PHASE] == self.phase] if self.phase else results
 
-    def confounded(self, results: "pd.DataFrame", measure: str) -> str:
-        """Return what the effect that is asked for cannot be told from; empty where it can."""
-        words, columns = self.confusable
-        if not words:
-            return ""
+    def confounded(
+        self,
+        results: "pd.DataFrame",
+        measure: str,
+        people: Collection[str],
+        effect: Sequence[str] = (),
+    ) -> str:
+        """Return what an effect cannot be told from in those who are in its test; empty if none.
+
+        Parameters
+        ----------
+        people
+            Who is in the test: others may have come in orders that would tell it apart.
+        effect
+            Its columns; those that are asked for by default.
+        """
         known = self.of(results).dropna(subset=[measure])
-        # A condition is all of a participant's phase: it is told from phases over participants.
-        person = ("participant",) if CONDITION in self.asked else ("participant", PHASE)
-        apart = told_apart(known, self.asked, [person, columns])
-        return "" if apart else words
+        known = known[known["participant"].isin(people)]
+        effect = effect or self.asked
+        # A session, block or condition is all of a participant's phase: it is told from what comes
+        # with it over participants.
+        person = ("participant",) if set(effect) <= OF_PHASES else ("participant", PHASE)
+        found = [
+            words
+            for words, columns in self.confusable
+            if set(columns) <= set(known)
+            and not set(columns) & set(effect)
+            and not told_apart(known, effect, [person, columns])
+        ]
+        return " and ".join(found)
 
 
 CONDITIONS = Plan((CONDITION,), (CONDITION,), confusable=ORDER)
@@ -116,12 +155,15 @@ def anova_table(
     for measure in measures_in(results, primary):
         own: dict[str, Anova] = {}
         for plan in plans(results, factors):
-            confounded = plan.confounded(results, measure)
             for test in tests_of(plan, results, measure, factors):
                 name = named(test, factors)
-                of_it = confounded if test.factor == ":".join(plan.asked) + plan.suffix else ""
-                # Groups come with every design.
-                own.setdefault(name, replace(test, factor=name, confounded=of_it))
+                if name in own:
+                    continue  # groups come with every design
+                effect = tuple(test.factor.removesuffix(plan.suffix).split(":"))
+                of_it = ""
+                if effect == (plan.asked or tuple(part for part in effect if part != GROUP)):
+                    of_it = plan.confounded(results, measure, test.people, effect)
+                own[name] = replace(test, factor=name, confounded=of_it)
         found += own.values()
     return _frame(found, factors.people)
 
@@ -143,11 +185,11 @@ def plans(results: "pd.DataFrame", factors: Factors) -> Iterator[Plan]:
     phases = tuple(factors.over_phases)
     pair = pair_of(results)
     # First, because most participants are whole there.
-    yield Plan(phases)
+    yield Plan(phases, confusable=BESIDE_PHASES)
     if factors.conditions:
         yield CONDITIONS
     # Positions of phases of unequal length have nothing to do with each other.
-    confusable = (PAIRS, (pair,)) if pair else ("", ())
+    confusable = ((PAIRS, (pair,)),) if pair else ()
     for phase in ("",) if factors.alike else factors.phases:
         within = (PLACE,) if phase else (*phases, PLACE)
         yield Plan(within, (PLACE,), phase=phase, confusable=confusable)
@@ -219,27 +261,30 @@ def contrast_table(
     for measure in measures_in(results, primary):
         found += compare(results, measure, GROUP, phases, between)
         for name in phases:
-            found += compare(results, measure, name, phases, between)
+            of_phases = compare(results, measure, name, phases, between)
             found += compare(results, measure, GROUP, phases, between, at=name)
             for other in phases:
                 if other != name:
-                    found += compare(results, measure, name, phases, between, at=other)
+                    of_phases += compare(results, measure, name, phases, between, at=other)
+            found += [replace(one, confounded=_of_phases(results, one, name)) for one in of_phases]
         plan = Plan((*phases, DISTANCE), (DISTANCE,), confusable=POSITIONS)
-        confounded = plan.confounded(results, measure)
-        found += [
-            replace(one, confounded=confounded)
-            for one in compare(results, measure, DISTANCE, plan.within, between)
-        ]
+        for one in compare(results, measure, DISTANCE, plan.within, between):
+            confounded = plan.confounded(results, measure, one.people)
+            found.append(replace(one, confounded=confounded))
         if factors.conditions:
-            confounded = CONDITIONS.confounded(results, measure)
-            found += [
-                replace(one, confounded=confounded)
-                for one in compare(
-                    CONDITIONS.of(results), measure, CONDITION, CONDITIONS.within, between
-                )
-            ]
+            own = CONDITIONS.of(results)
+            for one in compare(own, measure, CONDITION, CONDITIONS.within, between):
+                two = own[own[CONDITION].isin([one.first, one.second])]
+                confounded = CONDITIONS.confounded(two, measure, one.people)
+                found.append(replace(one, confounded=confounded))
     named = [replace(one, factor=named_factor(one.factor, factors)) for one in found]
     return pd.DataFrame([_row(one, factors.people) for one in named])
+
+
+def _of_phases(results: "pd.DataFrame", one: Contrast, name: str) -> str:
+    """Return what the difference of two sessions or blocks cannot be told from; empty if none."""
+    two = results[results[name].isin([one.first, one.second])]
+    return Plan((), (name,), confusable=BESIDE_PHASES).confounded(two, one.measure, one.people)
 
 
 def trend_table(
@@ -265,7 +310,7 @@ def trend_table(
         {
             **_row(trend, factors.people),
             factors.kind: phase,
-            "confounded": trend_confounded(results, trend.measure, phase),
+            "confounded": trend_confounded(results, trend.measure, phase, trend.people),
             "slope_low": trend.slope_ci[0],
             "slope_high": trend.slope_ci[1],
             "p_holm": next(p_holm) if trend.measure in corrected else float("nan"),
@@ -275,11 +320,13 @@ def trend_table(
     return pd.DataFrame(rows).drop(columns="slope_ci", errors="ignore")
 
 
-def trend_confounded(results: "pd.DataFrame", measure: str, phase: str) -> str:
-    """Return what positions of a phase cannot be told from; empty where they can."""
+def trend_confounded(
+    results: "pd.DataFrame", measure: str, phase: str, people: Collection[str]
+) -> str:
+    """Return what positions of a phase cannot be told from in some people; empty where they can."""
     pair = pair_of(results)
-    confusable = (PAIRS, (pair,)) if pair else ("", ())
-    return Plan((PLACE,), (PLACE,), phase=phase, confusable=confusable).confounded(results, measure)
+    plan = Plan((PLACE,), (PLACE,), phase=phase, confusable=((PAIRS, (pair,)),) if pair else ())
+    return plan.confounded(results, measure, people)
 
 
 def time_scale_tables(
@@ -291,7 +338,8 @@ def time_scale_tables(
     tables, tests = [], []
     for measure in measures_in(results, primary):
         found = quantities(results, measure)
-        tables.append(summary(found, measure, factors.people))
+        of_all = summary(found, measure, factors.people)
+        tables.append(of_all.assign(confounded=_between_phases(results, of_all, found, factors)))
         if not factors.between:
             continue
         for (phase, quantity), own in found.groupby(["phase", "quantity"], sort=False):
@@ -302,6 +350,25 @@ def time_scale_tables(
     by_group = [table for table in tests if len(table)]
     joined = pd.concat(by_group, ignore_index=True) if by_group else pd.DataFrame()
     return pd.concat(tables, ignore_index=True), joined
+
+
+def _between_phases(
+    results: "pd.DataFrame", rows: "pd.DataFrame", found: "pd.DataFrame", factors: Factors
+) -> list[str]:
+    """Return for each row what a change from the phase before cannot be told from."""
+    words = []
+    for row in rows.to_dict("records"):
+        at = factors.phases.index(str(row["phase"]))
+        if row["quantity"] not in FROM_BEFORE or not at:
+            words.append("")
+            continue
+        own = found[(found["phase"] == row["phase"]) & (found["quantity"] == row["quantity"])]
+        if row["group"] != "all":
+            own = own[own["group"] == row["group"]]
+        two = results[results[PHASE].isin(factors.phases[at - 1 : at + 1])]
+        plan = Plan((), (PHASE,), confusable=BESIDE_PHASES)
+        words.append(plan.confounded(two, str(row["measure"]), set(own["participant"])))
+    return words
 
 
 def score_table(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":

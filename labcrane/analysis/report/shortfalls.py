@@ -178,7 +178,7 @@ def _of_plan(
         if not plan.beside or name in made:
             yield from design.lacking(effect, name, tested=name in made)
         elif before in made:
-            apart = plan.confounded(results, measure)
+            apart = plan.confounded(results, measure, design.whole)
             few = "so few people leave nothing to tell how they differ"
             why = f"positions cannot be told from {apart}" if apart else few
             yield Shortfall(measure, name, "", len(people), len(design.whole), why)

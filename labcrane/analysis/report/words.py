@@ -278,6 +278,7 @@ def _scale(row: Mapping[str, Any], style: Style, results: Results) -> str:
     said = f"{spoken[row['quantity']]} {style.plain(str(row['phase']))}"
     if row["why"]:
         return f"{said}: not tested, {row['why']}."
+    said += _confounded(row)
     said += f", with {row['adjustment']}:" if row["adjustment"] else ":"
     return f"{said} {mean}, {_t(row, style)}{of_people(row, style, results.people)}."
 

@@ -21,8 +21,8 @@ WIDTH_FACTOR = math.sqrt(2.0 * math.pi * math.e)
 POOL_BELOW = 15
 """Fewer ends than this do not give a condition a width of its own."""
 
-CONDITION = "distance"
-"""The column that says to which condition a movement belongs."""
+CONDITION = ("distance", "width")
+"""Columns that say to which condition a movement belongs."""
 
 
 def difficulty(distance: float, width: float) -> float:
@@ -110,10 +110,10 @@ def throughput(movements: "pd.DataFrame") -> "pd.DataFrame":
     """Return each participant's throughput: the mean over conditions of IDe over mean MT.
 
     Of means, as ISO 9241-411 has it: a mean of single movements' ratios is higher, the more so the
-    more their times vary. A condition is a distance. Its effective width comes of the spread of its
-    ends along the task axis. With fewer than :data:`POOL_BELOW` ends in a condition, the
-    participant's conditions share one spread, each about its own mean; with fewer than that in all,
-    all participants do.
+    more their times vary. A condition is a distance and a width. Its effective width comes of the
+    spread of its ends along the task axis. With fewer than :data:`POOL_BELOW` ends in a condition,
+    the participant's conditions share one spread, each about its own mean; with fewer than that in
+    all, all participants do.
     ``pooled`` says which. Where a task only ends inside the target, ends are cut off at its edge
     and throughput is flattered; ``bounded`` counts those ends.
 
@@ -125,13 +125,14 @@ def throughput(movements: "pd.DataFrame") -> "pd.DataFrame":
     import pandas as pd
 
     movements = movements.dropna(subset=["movement_time", "amplitude", "error_along"])
-    everybody = _spread(movements, ["participant", CONDITION])
+    by = [name for name in CONDITION if name in movements]
+    everybody = _spread(movements, ["participant", *by])
     rows = []
     for participant, own in movements.groupby("participant"):
-        groups = [group for _, group in own.groupby(CONDITION)]
+        groups = [group for _, group in own.groupby(by, dropna=False)]
         few = min(len(group) for group in groups) < POOL_BELOW
         pooled = "no" if not few else "participant" if len(own) >= POOL_BELOW else "study"
-        shared = everybody if pooled == "study" else _spread(own, [CONDITION])
+        shared = everybody if pooled == "study" else _spread(own, by)
         bits = []
         for group in groups:
             spread = float(group["error_along"].std(ddof=1)) if pooled == "no" else shared
@@ -153,6 +154,7 @@ def throughput(movements: "pd.DataFrame") -> "pd.DataFrame":
 def _spread(table: "pd.DataFrame", by: list[str]) -> float:
     """Return the standard deviation about the conditions' own means."""
     ends = table["error_along"]
-    about = ends - table.groupby(by)["error_along"].transform("mean")
-    free = len(table) - table.groupby(by).ngroups
+    conditions = table.groupby(by, dropna=False)
+    about = ends - conditions["error_along"].transform("mean")
+    free = len(table) - conditions.ngroups
     return float(np.sqrt((about**2).sum() / free)) if free > 0 else float("nan")

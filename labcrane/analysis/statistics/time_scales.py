@@ -30,6 +30,9 @@ QUANTITIES = {
 }
 """What is worked out of each participant's session or block."""
 
+FROM_BEFORE = ("change", "difference score", "net gain")
+"""Those that go from one session or block to the next."""
+
 
 TAKEN = "pairs' means taken away"
 """An adjustment that was made: what pairs of targets add is taken away."""
