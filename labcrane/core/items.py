@@ -4,6 +4,7 @@ import math
 import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Literal
 
 from labcrane.core.records import Value
@@ -73,11 +74,38 @@ class Item:
         span = f"{self.lowest:g} to {self.highest:g}"
         if self.step:
             span += f" in steps of {self.step:g}"
-        said = ", ".join(f"{at:g} {words}" for at, words in self.words)
+        said = ", ".join(f"{at:g} {words}" for at, words in self.worded.items())
         return f"{span}: {said}" if said else span
 
+    @property
+    def steps(self) -> int:
+        """How many steps lead from the lowest answer to the highest; 0 where ``step`` is 0."""
+        if not self.step:
+            return 0
+        return math.floor((self.highest - self.lowest) / self.step + STEP_TOLERANCE)
+
+    def at_step(self, number: int) -> float:
+        """Return the answer at a step, counted from 0 at the lowest.
+
+        Worked out in decimals, as people write it: 3 steps of 0.1 from 0 are 0.3.
+        """
+        lowest, step = (Decimal(repr(float(each))) for each in (self.lowest, self.step))
+        # A step written as 0.3333333334 leads beyond a highest of 1 by less than the tolerance.
+        return min(float(lowest + number * step), float(self.highest))
+
+    def nearest(self, number: float) -> float:
+        """Return the answer at the step nearest to a number; the number where ``step`` is 0."""
+        if not self.step:
+            return number
+        return self.at_step(round((number - self.lowest) / self.step))
+
+    @property
+    def worded(self) -> Mapping[float, str]:
+        """What is written at each of the answers that have words."""
+        return {self.nearest(at): words for at, words in self.words}
+
     def check(self, answer: object) -> Value:
-        """Return an answer as it is recorded; None declines the question.
+        """Return an answer as it is recorded, a number as its step; None declines the question.
 
         Raises
         ------
@@ -91,7 +119,7 @@ class Item:
             if fits and (self.kind == "text" or answer in self.choices):
                 return _written(str(answer))
         elif _is_number(answer) and self._on_scale(float(str(answer))):
-            return float(str(answer))
+            return self.nearest(float(str(answer)))
         raise AnswerError(f"item {self.name!r} takes {self.takes}, not {answer!r}")
 
     def _on_scale(self, number: float) -> bool:

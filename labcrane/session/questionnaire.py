@@ -171,8 +171,9 @@ def _any(item: Item, dice: random.Random) -> Value:
         return dice.choice(item.choices)
     if item.kind == "text":
         return "simulated"
-    step = item.step or (item.highest - item.lowest) / 10.0
-    return item.lowest + step * dice.randint(0, round((item.highest - item.lowest) / step))
+    if item.step:
+        return item.at_step(dice.randint(0, item.steps))
+    return item.lowest + (item.highest - item.lowest) / 10.0 * dice.randint(0, 10)
 
 
 class QuestionnaireRun:

@@ -317,10 +317,7 @@ def _drawn(
     if isinstance(spread, Shares):
         shares = np.array(list(spread.shares.values()))
         return list(spread.shares)[int(random.choice(len(shares), p=shares / shares.sum()))]
-    value = spread.draw(random)
-    return (
-        item.lowest + item.step * round((value - item.lowest) / item.step) if item.step else value
-    )
+    return item.nearest(spread.draw(random))
 
 
 def _check_names(

@@ -145,12 +145,12 @@ class Form:
                 self._choices(
                     name, item, dict(zip(item.choices, item.labels or item.choices, strict=True))
                 )
-            elif item.kind == "scale" and item.step and _ticks(item) <= MOST_TICKS:
-                values = [item.lowest + item.step * tick for tick in range(_ticks(item))]
+            elif item.kind == "scale" and item.step and item.steps < MOST_TICKS:
+                values = map(item.at_step, range(item.steps + 1))
                 self._choices(name, item, {value: _label(item, value) for value in values})
             else:
                 if item.words:
-                    self._choices(name, item, {at: _label(item, at) for at, _ in item.words})
+                    self._choices(name, item, {at: _label(item, at) for at in item.worded})
                 self._field(name, item)
             with ui.element("div").classes("form-below"):
                 ui.button(
@@ -267,12 +267,8 @@ class Form:
 
 def _label(item: Item, value: float) -> str:
     """Return what stands at a step of a scale: its number and words, or nothing."""
-    said = dict(item.words).get(value, "")
+    said = item.worded.get(value, "")
     return f"{value:g}  {said}".strip() if item.numbered else said
-
-
-def _ticks(item: Item) -> int:
-    return round((item.highest - item.lowest) / item.step) + 1
 
 
 def _number(text: str) -> float | str:

@@ -1,5 +1,6 @@
 """Settings of the questionnaires."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -24,9 +25,6 @@ SIX = 6
 """Scales of the task load index."""
 
 NAME = r"^[a-z][a-z0-9_]*$"
-
-
-STEP_TOLERANCE = 1e-6
 
 
 def unstepped(words: Mapping[float, str], lowest: float, highest: float, step: float) -> str:
@@ -281,14 +279,12 @@ class QuestionSettings(Settings):
         if self.kind not in {"scale", "number"}:
             words = [key for key in ("left", "right") if getattr(self, key)]
             return f"has {' and '.join(words)}, which only a scale shows" if words else ""
-        if self.step:
-            steps = (self.highest - self.lowest) / self.step
-            if abs(steps - round(steps)) > STEP_TOLERANCE:
-                last = self.lowest + int(steps) * self.step
-                return (
-                    f"goes from {self.lowest:g} to {self.highest:g} in steps of {self.step:g}, so "
-                    f"that {last:g} is the most that can be answered"
-                )
+        item = self.item()
+        if item.step and not math.isclose(last := item.at_step(item.steps), self.highest):
+            return (
+                f"goes from {self.lowest:g} to {self.highest:g} in steps of {self.step:g}, so "
+                f"that {last:.10g} is the most that can be answered"
+            )
         return ""
 
     def item(self) -> Item:

@@ -15,6 +15,7 @@ from labcrane.replay import replay_session
 from labcrane.session.questionnaire import QuestionnaireForm
 from labcrane.session.session import Visit, run
 from labcrane.testing import QuestionnaireContract
+from labcrane.web.form import _label
 from labcrane_questionnaires.demographics import Demographics
 from labcrane_questionnaires.free import Free
 from labcrane_questionnaires.licensed_scales import SLOTS
@@ -297,6 +298,28 @@ def test_words_at_no_step_are_refused(tmp_path: Path, words: str, said: str) -> 
         FreeSettings.model_validate({"title": "T", "questions": [question]})
     with pytest.raises(ValidationError, match="'a' is no scale and has words"):
         FreeSettings.model_validate({"title": "T", "questions": [{**question, "kind": "text"}]})
+
+
+def test_words_at_tenths_stand_on_the_page_and_answers_are_the_numbers_that_were_written() -> None:
+    words = {0: "never", 0.3: "seldom", 0.6: "often", 0.7: "mostly", 1: "always"}
+    question = {"name": "a", "text": "A", "highest": 1, "step": 0.1, "words": words}
+    settings = FreeSettings.model_validate({"title": "T", "questions": [question]})
+    (item,) = Free(settings).items()
+    shown = [item.at_step(number) for number in range(item.steps + 1)]
+    assert shown == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]
+    said = [_label(item, value) for value in shown]
+    assert [each for each in said if " " in each] == [
+        "0  never", "0.3  seldom", "0.6  often", "0.7  mostly", "1  always",
+    ]  # fmt: skip
+    assert item.check(0.1 * 3) == 0.3
+    assert [item.check(value) for value in shown] == shown
+
+
+def test_no_step_of_a_scale_lies_beyond_its_highest_answer() -> None:
+    uneven = Item("a", "A", highest=11.0, step=4.0)
+    assert [uneven.at_step(number) for number in range(uneven.steps + 1)] == [0.0, 4.0, 8.0]
+    thirds = Item("a", "A", highest=1.0, step=0.3333333334)
+    assert (thirds.steps, thirds.check(1.0), thirds.at_step(3)) == (3, 1.0, 1.0)
 
 
 def test_cr10_takes_decimals_and_numbers_above_ten(tmp_path: Path) -> None:
