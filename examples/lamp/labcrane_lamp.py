@@ -24,7 +24,7 @@ from labcrane import (
     hookimpl,
     offer,
 )
-from labcrane.core import Value
+from labcrane.core import Value, Within
 
 labcrane_api = 1
 
@@ -44,8 +44,8 @@ class LampSettings(Settings):
     shake_below: float = Field(default=0.5, ge=0.0)
     """Distance in metres below which the motor runs, the faster the closer."""
 
-    def reveals(self) -> tuple[str, ...]:
-        return ("how far the tip is from the target",)
+    def reveals(self) -> tuple[Within, ...]:
+        return (Within("how far the tip is from the target", max(self.far, self.shake_below)),)
 
 
 class Lamp(Feedback):

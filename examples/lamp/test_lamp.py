@@ -40,6 +40,12 @@ def test_light_and_motor_follow_the_distance(device: LampDevice) -> None:
     assert device.motor == [0, 128, 255, 0]
 
 
+def test_the_distance_is_told_as_far_as_light_or_motor_follows_it() -> None:
+    for far, shake_below, told in ((4.0, 0.5, "up to 4 m"), (0.5, 1.0, "up to 1 m")):
+        (fact,) = LampSettings(port="COM3", far=far, shake_below=shake_below).reveals()
+        assert str(fact) == f"how far the tip is from the target, {told}"
+
+
 def test_something_else_on_the_port_is_refused() -> None:
     modem = LampDevice(name="AT")
     lamp = Lamp(LampSettings(port=modem.port))

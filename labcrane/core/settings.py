@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
@@ -41,15 +42,36 @@ def read_settings(path: Path, model: type[ModelT]) -> ModelT:
     return YamlFile.read(path).checked(model)
 
 
+@dataclass(frozen=True, slots=True)
+class Within:
+    """A fact of the task's error that is told within a distance, and no more beyond it.
+
+    Attributes
+    ----------
+    fact
+        What is learnt: ``how far the tip is from the target``.
+    far
+        Up to which distance of tip and target, in metres.
+    """
+
+    fact: str
+    far: float
+
+    def __str__(self) -> str:
+        return f"{self.fact}, up to {self.far:g} m"
+
+
 class Settings(StrictModel):
     """Base of every plugin's settings: unknown keys are errors, values never change."""
 
-    def reveals(self) -> tuple[str, ...]:
+    def reveals(self) -> tuple[str | Within, ...]:
         """Return what everyone who sees or hears the component learns of the task's error.
 
         A fact each, nothing by default; components that tell the same use the same words. What
-        reveals something is feedback, and belongs to the design: ``labcrane check`` asks about it
-        where it is always there, in every group, and where groups are told different facts.
+        these settings make constant is no fact, and one that is told up to a distance is
+        :class:`Within` it. What reveals something is feedback, and belongs to the design:
+        ``labcrane check`` asks about it where it is always there, in every group, and where groups,
+        conditions or blocks of one task are told different facts.
         """
         return ()
 

@@ -13,6 +13,7 @@ from labcrane.analysis.presented import operators_views
 from labcrane.analysis.scoring.settings import COUNTS, RATINGS, TIME
 from labcrane.core.references import Reference, mentioned
 from labcrane.core.roles import Controller
+from labcrane.core.settings import Within
 from labcrane.errors import LabcraneError, ProtocolError, suggestion
 from labcrane.files.pseudonyms import pseudonyms
 from labcrane.files.system import is_there
@@ -260,28 +261,73 @@ def _of_repeats(study: Study) -> Doubts:
 
 
 def _of_what_is_told(study: Study) -> Doubts:
-    """Question groups, and conditions, in which people are told different facts by other means."""
-    design, parts = study.protocol.design, {**study.cues, **study.sounds}
-    meant = {"all": tuple(parts), "none": (), "group": ()}
+    """Question groups, conditions and blocks that tell people different facts by other means."""
+    design, everything = study.protocol.design, tuple(study.protocol.feedback)
+    meant = {"all": everything, "none": (), "group": ()}
     conditions = {
         name: switch if isinstance(switch, tuple) else meant[switch]
         for name, switch in design.conditions.items()
     }
     for key, some in (("groups", design.groups), ("conditions", conditions)):
-        told: dict[frozenset[str], str] = {}
-        for name, feedback in some.items():
-            facts = frozenset(fact for each in feedback for fact in parts[each].settings.reveals())
-            if not facts or facts in told:
+        yield from _told_apart(
+            key,
+            {
+                ("design", key, name): (repr(name), _facts(study, feedback))
+                for name, feedback in some.items()
+            },
+        )
+    for group, own in (design.groups or {"": ()}).items():
+        meant["group"] = own
+        tasks: dict[str, dict[Place, tuple[str, Facts]]] = {}
+        for place, kind, block in _steps(study):
+            if kind != "block" or block.condition is not None or not any(block.fading):
                 continue
-            for others, other in told.items():
-                more = [*sorted(facts - others), *sorted(others - facts)]
-                yield (
-                    ("design", key, name),
-                    f"{key} {other!r} and {name!r} are not told the same: in only one of them "
-                    f"people learn {' and '.join(more)}, so that the way of telling cannot be told "
-                    "from what is told",
-                )
-            told[facts] = name
+            on = block.feedback if isinstance(block.feedback, tuple) else meant[block.feedback]
+            at = f"step {int(place[3]) + 1} of {study.protocol.sessions[int(place[1])].name!r}"
+            tasks.setdefault(block.task, {})[place] = at, _facts(study, on)
+        for ways in tasks.values():
+            yield from _told_apart(f"in group {group!r}, blocks at" if group else "blocks at", ways)
+
+
+Facts = Mapping[str, float]
+"""Up to which distance, in metres, each fact of the error is told; infinity where at any."""
+
+
+def _facts(study: Study, feedback: Sequence[str]) -> Facts:
+    parts, told = {**study.cues, **study.sounds}, dict[str, float]()
+    for name in feedback:
+        for each in parts[name].settings.reveals():
+            fact, far = (each.fact, each.far) if isinstance(each, Within) else (each, math.inf)
+            told[fact] = max(told.get(fact, 0.0), far)
+    return told
+
+
+def _told_apart(what: str, ways: Mapping[Place, tuple[str, Facts]]) -> Doubts:
+    """Question each way of telling, by name and facts, that tells other facts than one before."""
+    seen: list[tuple[str, Facts]] = []
+    for place, (name, facts) in ways.items():
+        if not facts or any(facts == others for _, others in seen):
+            continue
+        for other, others in seen:
+            alone = {other: _only(others, facts), name: _only(facts, others)}
+            said = "; ".join(
+                f"in {way} alone people learn {each}" for way, each in alone.items() if each
+            )
+            yield (
+                place,
+                f"{what} {other} and {name} are not told the same: {said}; the way of telling "
+                "cannot be told from what is told",
+            )
+        seen.append((name, facts))
+
+
+def _only(facts: Facts, others: Facts) -> str:
+    """Return in words what is told here and not there, or not so far."""
+    return " and ".join(
+        str(Within(fact, far)) if far < math.inf else fact + ", at any distance" * (fact in others)
+        for fact, far in sorted(facts.items())
+        if others.get(fact) != far
+    )
 
 
 def _of_components(study: Study) -> Doubts:
@@ -295,9 +341,8 @@ def _of_components(study: Study) -> Doubts:
         ):
             yield (
                 place,
-                f"{part}: {choice.name} tells {' and '.join(told)}, in every group and block; put "
-                "it under "
-                "feedback, where the design says who is given it",
+                f"{part}: {choice.name} tells {' and '.join(map(str, told))}, in every "
+                "group and block; put it under feedback, where the design says who is given it",
             )
 
 

@@ -14,7 +14,7 @@ from pydantic import (
 )
 
 from labcrane import Machine, Settings
-from labcrane.core import Names, Unit, WrongKey, was_run
+from labcrane.core import Names, Unit, Within, WrongKey, was_run
 
 MOST_OVERTONES = 15
 LOWEST_HZ, HIGHEST_HZ = 40.0, 10_000.0
@@ -91,8 +91,12 @@ class SonificationSettings(Settings):
             )
         return device
 
-    def reveals(self) -> tuple[str, ...]:
-        told = ["how far the tip is from the target"]
+    def reveals(self) -> tuple[str | Within, ...]:
+        if not any(self.level):
+            return ()
+        told: list[str | Within] = []
+        if not self._is_constant:
+            told.append(Within("how far the tip is from the target", self.far))
         if self.pan != "none":
             told.append("on which side the target is")
         if self.silent_after_s is not None:
@@ -108,8 +112,11 @@ class SonificationSettings(Settings):
         highest = many * (1 + max(self.overtones))
         if few < LOWEST_HZ or many > HIGHEST_HZ:
             found["pitch_hz"] = f"is {few:g} to {many:g} Hz, which not everybody hears"
-        elif few == many and self.overtones[0] == self.overtones[1]:
-            found["pitch_hz"] = f"is {few:g} Hz at every distance, so that nothing is heard of it"
+        elif self._is_constant:
+            found["pitch_hz"] = (
+                f"is {few:g} Hz at every distance, and overtones and level do not change, so that "
+                "nothing is heard of it"
+            )
         elif highest > self.rate_hz / 2:
             found["overtones"] = (
                 f"reach {highest:g} Hz, and {self.rate_hz} samples a second hold half their "
@@ -120,6 +127,10 @@ class SonificationSettings(Settings):
         if not FEWEST_SAMPLES <= self.rate_hz <= MOST_SAMPLES:
             found["rate_hz"] = f"is {self.rate_hz}, which few sound cards play"
         return found
+
+    @property
+    def _is_constant(self) -> bool:
+        return all(far == near for far, near in (self.pitch_hz, self.overtones, self.level))
 
     @model_validator(mode="after")
     def _levels_and_overtones_are_possible(self) -> "SonificationSettings":

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from labcrane import Machine, Settings
-from labcrane.core import Names, Unit, WrongKey
+from labcrane.core import Names, Unit, Within, WrongKey
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -47,19 +47,30 @@ class SphereSettings(Settings):
     opacity: float = Field(default=0.45, gt=0.0, le=1.0)
     """1 hides what is behind it."""
 
-    def reveals(self) -> tuple[str, ...]:
-        return ("how far the tip is from the target",)
+    def reveals(self) -> tuple[Within, ...]:
+        if self._is_constant:
+            return ()
+        return (Within("how far the tip is from the target", self.far),)
 
     def provides(self, machine: Machine) -> Names:
         return {"object": ["sphere"]}
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
+        if self._is_constant:
+            return {
+                "brightness": "is constant, and smallest and largest are both "
+                f"{self.largest:g} m, so that the sphere looks the same at every distance"
+            }
         if self.largest < self.far:
             return {}
         return {
             "largest": f"is {self.largest:g} m, and so the sphere reaches from the target to "
             f"a tip that is far, {self.far:g} m away"
         }
+
+    @property
+    def _is_constant(self) -> bool:
+        return self.smallest == self.largest and self.brightness == "constant"
 
     @model_validator(mode="after")
     def _sizes_rise(self) -> "SphereSettings":

@@ -50,6 +50,15 @@ BALL = "feedback: {ball: {use: sphere}, tone: {use: sphere}}\nsessions:"
 SEEN = f"views: {{front: {{use: view}}}}\n{BALL}"
 GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
 
+BOTH = "{ball: {use: sphere}, tone: {use: sonification}}"
+NEAR = (
+    "feedback: {ball: {use: sphere, far: 4.0}, "
+    "tone: {use: sonification, far: 0.3, pan: none, silent_after_s: null}}\n"
+    "design: {groups: {none: [], seen: [ball], heard: [tone]}}\n"
+)
+TWO_BLOCKS = "".join(
+    BLOCK.replace("pairs", f"feedback: [{each}], pairs") for each in ("ball", "tone")
+)
 UNEQUAL = (
     "feedback: {ball: {use: sphere}, tone: {use: sonification}}\n"
     "design: {groups: {none: [], seen: [ball], heard: [tone], both: [ball, tone]}}\n"
@@ -130,7 +139,13 @@ UNLIKE = [
           (BLOCK, BLOCK.replace("pairs", "feedback: group, pairs"))],
          "design.groups.ball", "groups 'all' and 'ball' are given the same feedback"),
         ([("sessions:", f"{UNEQUAL}sessions:"), (BLOCK, BLOCK.replace("pairs", "feedback: group, pairs"))],
-         "design.groups.heard", "in only one of them people learn on which side the target is and whether the tip is inside the target, so"),
+         "design.groups.heard", "in 'heard' alone people learn on which side the target is and whether the tip is inside the target;"),
+        ([("sessions:", f"{NEAR}sessions:"), (BLOCK, BLOCK.replace("pairs", "feedback: group, pairs"))],
+         "design.groups.heard", "in 'seen' alone people learn how far the tip is from the target, up to 4 m; in 'heard' alone people learn how far the tip is from the target, up to 0.3 m; the way"),
+        ([("sessions:", f"feedback: {BOTH}\nsessions:"), (BLOCK, TWO_BLOCKS)], "sessions.1.steps.2.block",
+         "blocks at step 1 of 'only' and step 2 of 'only' are not told the same: in step 2 of 'only' alone people learn on which side the target is and whether the tip is inside the target; the way"),
+        ([("sessions:", "feedback: {ball: {use: sphere, smallest: 0.3, largest: 0.3, brightness: constant}}\nsessions:")], "feedback.ball.brightness",
+         "smallest and largest are both 0.3 m, so that the sphere looks the same at every distance"),
         ([(BLOCK, BLOCK.replace("pairs", "ask: [nasa_tlx, nasa_tlx], pairs"))],
          "sessions.1.steps.1.block.ask.2", "has 'nasa_tlx' twice"),
         ([("machine: ch8", "operator: {use: simulated_operator, reaction_sd: 1e300}\nmachine: ch8")],
@@ -214,6 +229,30 @@ def test_a_number_that_nobody_means_is_asked_about_until_it_is_answered(
     assert asked[key].endswith("is that meant?")
     answer = ("sessions:", f"expected: [{', '.join(asked)}]\nsessions:")
     assert questions(a_study(tmp_path, *changes, answer)) == ()
+
+
+def test_a_cue_that_is_told_nearer_beside_one_that_is_told_farther_adds_no_fact(
+    tmp_path: Path,
+) -> None:
+    both = NEAR.replace("heard: [tone]", "both: [ball, tone]")
+    group = (BLOCK, BLOCK.replace("pairs", "feedback: group, pairs"))
+    asked = questions(a_study(tmp_path, ("sessions:", f"{both}sessions:"), group))
+    assert not [each for each in asked if "not told the same" in each.text]
+
+
+def test_blocks_that_tell_the_same_and_blocks_of_other_tasks_are_not_asked_about(
+    tmp_path: Path,
+) -> None:
+    alike = BOTH.replace("sonification", "sonification, pan: none, silent_after_s: null")
+    changes = [("sessions:", f"feedback: {alike}\nsessions:"), (BLOCK, TWO_BLOCKS)]
+    found = questions(a_study(tmp_path, *changes))
+    other = [
+        ("tasks:", "tasks:\n  also: {use: aiming, distances: [2], width: 0.5, movements: 2}"),
+        ("sessions:", f"feedback: {BOTH}\nsessions:"),
+        (BLOCK, "also, ".join(TWO_BLOCKS.rsplit("aiming, ", 1))),
+    ]
+    found += questions(a_study(tmp_path, *other))
+    assert not [each for each in found if "not told the same" in each.text]
 
 
 def test_300_answers_after_the_trials_of_a_step_are_not_asked_about(tmp_path: Path) -> None:

@@ -303,3 +303,25 @@ def test_the_shipped_groups_of_sphere_and_tone_are_told_the_same() -> None:
     tone_alone = SonificationSettings(pan="none", silent_after_s=None)
     assert tone_alone.reveals() == SphereSettings().reveals()
     assert set(SonificationSettings().reveals()) > set(tone_alone.reveals())
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        SphereSettings(smallest=0.3, largest=0.3, brightness="constant"),
+        SonificationSettings(
+            pitch_hz=(440.0, 440.0), overtones=(2, 2), pan="none", silent_after_s=None
+        ),
+        SonificationSettings(level=(0.0, 0.0)),
+    ],
+)
+def test_a_cue_that_is_constant_tells_nothing(
+    settings: SphereSettings | SonificationSettings,
+) -> None:
+    assert settings.reveals() == ()
+
+
+def test_a_tone_whose_level_alone_changes_tells_the_distance() -> None:
+    louder = SonificationSettings(pitch_hz=(440.0, 440.0), overtones=(2, 2), level=(0.1, 0.3))
+    assert str(louder.reveals()[0]) == "how far the tip is from the target, up to 4 m"
+    assert "pitch_hz" not in louder.doubts(ch8())

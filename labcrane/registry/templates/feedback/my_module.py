@@ -17,6 +17,7 @@ from labcrane import (
     hookimpl,
     offer,
 )
+from labcrane.core import Within
 
 labcrane_api = 1
 
@@ -27,9 +28,9 @@ class MyPartSettings(Settings):
     far: PositiveFloat = 4.0
     """Distance of tip and target, in metres, from which on it is dark."""
 
-    def reveals(self) -> tuple[str, ...]:
+    def reveals(self) -> tuple[Within, ...]:
         # What it tells of the task's error: `labcrane check` asks who is given it. () for nothing.
-        return ("how far the tip is from the target",)
+        return (Within("how far the tip is from the target", self.far),)
 
 
 class MyPart(Feedback):
