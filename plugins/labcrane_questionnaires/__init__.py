@@ -12,6 +12,7 @@ from labcrane_questionnaires.settings import (
     RatingSettings,
     TlxSettings,
     TranslatedSettings,
+    WordedSettings,
 )
 
 labcrane_api = 1
@@ -54,15 +55,16 @@ def labcrane_questionnaires() -> list[Offer[Questionnaire]]:
         rating("situational_awareness"),
         offer("demographics", DemographicsSettings, demographics),
         offer("free", FreeSettings, free),
-        *(_from_the_lab(name) for name in ("ssq", "sart", "borg_cr10", "borg_rpe", "kss")),
+        _from_the_lab("sart", LabTextSettings),
+        *(_from_the_lab(name, WordedSettings) for name in ("ssq", "borg_cr10", "borg_rpe", "kss")),
     ]
 
 
-def _from_the_lab(name: str) -> Offer[Questionnaire]:
+def _from_the_lab(name: str, settings: type[LabTextSettings]) -> Offer[Questionnaire]:
     def build(settings: LabTextSettings, machine: Machine) -> Questionnaire:
         from labcrane_questionnaires import licensed_scales, sart, ssq
 
         makers = {"ssq": ssq.Ssq, "sart": sart.Sart, **licensed_scales.SLOTS}
         return makers[name](settings.text)
 
-    return offer(name, LabTextSettings, build)
+    return offer(name, settings, build)

@@ -173,8 +173,8 @@ class LabTextSettings(Settings):
     model_config = ConfigDict(json_schema_extra=_only_the_file)
 
     file: StudyPath
-    """YAML file with the words, beside the protocol: rights, items, and perhaps title, left and
-    right."""
+    """YAML file with the words, beside the protocol: rights, items, and perhaps title, left, right
+    and words."""
 
     text: LabText
     """What the file holds; read from it."""
@@ -188,6 +188,19 @@ class LabTextSettings(Settings):
                 "file: (docs/questionnaires.md says what is in it)"
             )
         return given if "text" in given else {**given, "text": _lab_file(given["file"], info)}
+
+
+class WordedSettings(LabTextSettings):
+    """Of a questionnaire whose scales are published with words at their steps."""
+
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        if self.text.words:
+            return {}
+        return {
+            "file": "has no words, which the publication has at the steps of the scale, so that "
+            "what is asked is not the published instrument; write them there, as words: "
+            "{0: none, 1: slight}"
+        }
 
 
 def _lab_file(name: str, info: ValidationInfo) -> Any:

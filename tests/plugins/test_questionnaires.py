@@ -11,6 +11,7 @@ from rehearsal import SHORT, ScriptedConsole, a_study
 from labcrane import ProtocolError, Questionnaire
 from labcrane.core import AnswerError, Item
 from labcrane.core.items import in_order
+from labcrane.protocol.questions import questions
 from labcrane.replay import replay_session
 from labcrane.session.questionnaire import QuestionnaireForm
 from labcrane.session.session import Visit, run
@@ -298,6 +299,28 @@ def test_words_at_no_step_are_refused(tmp_path: Path, words: str, said: str) -> 
         FreeSettings.model_validate({"title": "T", "questions": [question]})
     with pytest.raises(ValidationError, match="'a' is no scale and has words"):
         FreeSettings.model_validate({"title": "T", "questions": [{**question, "kind": "text"}]})
+
+
+@pytest.mark.parametrize("use", ["ssq", "kss", "borg_cr10", "borg_rpe", "sart"])
+def test_a_scale_that_is_published_with_words_is_asked_about_without_them(
+    tmp_path: Path, use: str
+) -> None:
+    items = [f"w{n}" for n in range({"ssq": 16, "sart": 10}.get(use, 1))]
+    more = f"questionnaires: {{q: {{use: {use}, file: q.yaml}}}}\n"
+    protocol = a_protocol("      - questionnaire: q\n", more)
+    asked = []
+    step = 7 if use == "borg_rpe" else 3
+    for words in ("", f"words: {{{step}: at this step}}\n"):
+        (tmp_path / "q.yaml").write_text(f"rights: x\nitems: {items}\n{words}")
+        found = questions(a_study(tmp_path, protocol))
+        asked.append([each for each in found if "questionnaires" in each.key])
+    if use == "sart":
+        assert asked == [[], []]
+        return
+    ((question,), worded) = asked
+    assert question.key == "questionnaires.q.file"
+    assert "so that what is asked is not the published instrument; write them" in question.text
+    assert not worded
 
 
 def test_words_at_tenths_stand_on_the_page_and_answers_are_the_numbers_that_were_written() -> None:
