@@ -10,8 +10,8 @@ from labcrane_questionnaires.settings import (
     FreeSettings,
     LabTextSettings,
     RatingSettings,
+    SusSettings,
     TlxSettings,
-    TranslatedSettings,
     WordedSettings,
 )
 
@@ -25,7 +25,7 @@ def labcrane_questionnaires() -> list[Offer[Questionnaire]]:
 
         return NasaTlx(settings)
 
-    def sus(settings: TranslatedSettings, machine: Machine) -> Questionnaire:
+    def sus(settings: SusSettings, machine: Machine) -> Questionnaire:
         from labcrane_questionnaires.sus import Sus
 
         return Sus(settings)
@@ -50,7 +50,7 @@ def labcrane_questionnaires() -> list[Offer[Questionnaire]]:
 
     return [
         offer("nasa_tlx", TlxSettings, tlx),
-        offer("sus", TranslatedSettings, sus),
+        offer("sus", SusSettings, sus),
         rating("subjective_accuracy"),
         rating("situational_awareness"),
         offer("demographics", DemographicsSettings, demographics),

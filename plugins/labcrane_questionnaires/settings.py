@@ -24,6 +24,9 @@ from labcrane.core import (
 SIX = 6
 """Scales of the task load index."""
 
+SUS_SPAN = (1.0, 5.0, 1.0)
+"""Lowest and highest answer of a statement of the system usability scale, and the step."""
+
 NAME = r"^[a-z][a-z0-9_]*$"
 
 
@@ -34,7 +37,7 @@ def unstepped(words: Mapping[float, str], lowest: float, highest: float, step: f
         try:
             scale.check(float(at))
         except AnswerError:
-            return f"has words at {at:g}, and takes {scale.takes}"
+            return f"has words at {at:g}, and takes {scale.takes}; write words at these alone"
     return ""
 
 
@@ -121,6 +124,16 @@ class TlxText(LabText):
             )
         return items
 
+    @field_validator("words")
+    @classmethod
+    def _are_at_the_ends(cls, words: dict[float, str], info: ValidationInfo) -> dict[float, str]:
+        if words and not was_run(info):
+            raise ValueError(
+                f"NASA task load index has words at {min(words):g}, and its scales have words at "
+                "their ends alone; write left, right and performance, and leave words out"
+            )
+        return words
+
     @field_validator("pair")
     @classmethod
     def _names_both(cls, pair: str) -> str:
@@ -155,6 +168,17 @@ class TranslatedSettings(Settings):
         if not (isinstance(given, dict) and isinstance(given.get("file"), str)):
             return given
         return given if "text" in given else {**given, "text": _lab_file(given["file"], info)}
+
+
+class SusSettings(TranslatedSettings):
+    """Of the system usability scale."""
+
+    @model_validator(mode="after")
+    def _words_are_at_steps(self, info: ValidationInfo) -> "SusSettings":
+        words = self.text.words if self.text is not None else {}
+        if not was_run(info) and (wrong := unstepped(words, *SUS_SPAN)):
+            raise WrongKey(f"SUS {wrong}", at=("file",))
+        return self
 
 
 class TlxSettings(TranslatedSettings):

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from labcrane import ProtocolError, Questionnaire
 from labcrane.core import Answers, Item, Score, numeric_answers
-from labcrane_questionnaires.settings import LabText, TranslatedSettings
+from labcrane_questionnaires.settings import SUS_SPAN, LabText, SusSettings
 
 STATEMENTS = (
     "I think that I would like to use this system frequently.",
@@ -37,7 +37,7 @@ class Sus(Questionnaire):
 
     scores = (Score("total", 0.0, 100.0),)
 
-    def __init__(self, settings: TranslatedSettings) -> None:
+    def __init__(self, settings: SusSettings) -> None:
         text = settings.text or ENGLISH
         if len(text.items) != len(NAMES):
             raise ProtocolError(
@@ -50,7 +50,7 @@ class Sus(Questionnaire):
         ends = (self._text.left, self._text.right)
         words = tuple(self._text.words.items())
         return [
-            Item(name, asked, "scale", 1.0, 5.0, 1.0, *ends, words=words)
+            Item(name, asked, "scale", *SUS_SPAN, *ends, words=words)
             for name, asked in zip(NAMES, self._text.items, strict=True)
         ]
 

@@ -27,8 +27,8 @@ from labcrane_questionnaires.settings import (
     FreeSettings,
     LabText,
     RatingSettings,
+    SusSettings,
     TlxSettings,
-    TranslatedSettings,
 )
 from labcrane_questionnaires.ssq import Ssq
 from labcrane_questionnaires.sus import NAMES, Sus
@@ -43,7 +43,7 @@ def a_lab_text(items: int) -> LabText:
 BUILT = {
     "nasa_tlx": NasaTlx(TlxSettings()),
     "tlx weighted": NasaTlx(TlxSettings(weighted=True)),
-    "sus": Sus(TranslatedSettings()),
+    "sus": Sus(SusSettings()),
     "ssq": Ssq(a_lab_text(16)),
     "sart": Sart(a_lab_text(10)),
     "subjective_accuracy": Rating("subjective_accuracy", RatingSettings()),
@@ -415,3 +415,25 @@ def test_the_load_index_and_sus_ask_in_the_language_of_the_labs_file(tmp_path: P
         from_file(tmp_path, "nasa_tlx", GERMAN.replace("{other}", "x"))
     with pytest.raises(ProtocolError, match="SUS has 10 statements, and the lab's file has 1"):
         from_file(tmp_path, "sus", "rights: x\nitems: [Satz]\n")
+
+
+def test_words_at_no_step_of_sus_and_any_at_steps_of_the_load_index_are_refused(
+    tmp_path: Path,
+) -> None:
+    statements = f"rights: x\nitems: {[f'Satz {n}' for n in range(10)]}\n"
+    worded = from_file(tmp_path, "sus", f"{statements}words: {{1: nein, 5: ja}}\n")
+    assert worded.items()[9].words == ((1.0, "nein"), (5.0, "ja"))
+    with pytest.raises(
+        ProtocolError,
+        match=r"q\.file: SUS has words at 7, and takes 1 to 5 in steps of 1; write words at these",
+    ):
+        from_file(tmp_path, "sus", f"{statements}words: {{1: nein, 7: ja}}\n")
+    with pytest.raises(
+        ProtocolError,
+        match="NASA task load index has words at 50, and its scales have words at their ends "
+        "alone; write left, right and performance, and leave words out",
+    ):
+        from_file(tmp_path, "nasa_tlx", f"{GERMAN}words: {{50: mittel}}\n")
+    was_run = {"recorded": True}
+    text = {"rights": "x", "items": ("S",) * 10, "words": {7: "ja"}}
+    assert SusSettings.model_validate({"text": text}, context=was_run).text.words == {7.0: "ja"}
