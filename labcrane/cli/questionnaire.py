@@ -16,10 +16,11 @@ class Sheet:
     name: str
     questionnaire: Questionnaire
     order: str = ""
+    turned: str = ""
 
     def items(self) -> Sequence[Item]:
-        """Return its questions, in the order of the record."""
-        return in_order(self.questionnaire.items(), self.order)
+        """Return its questions, as the record says that they are shown."""
+        return in_order(self.questionnaire.items(), self.order, self.turned)
 
     @staticmethod
     def read(item: Item, said: str) -> float | str | None:
@@ -50,8 +51,8 @@ class Sheets:
         if event.name == "questionnaire.start":
             name = str(event.data["questionnaire"])
             asked = self.questionnaires.get(name)
-            order = str(event.data.get("order", ""))
-            return Sheet(name, asked, order) if asked else None
+            order, turned = (str(event.data.get(key, "")) for key in ("order", "turned"))
+            return Sheet(name, asked, order, turned) if asked else None
         return None if event.name == "questionnaire.end" else sheet
 
 

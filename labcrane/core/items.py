@@ -3,7 +3,7 @@
 import math
 import random
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Literal
 
@@ -47,6 +47,9 @@ class Item:
         Whether it is one of those that are asked in an order drawn by chance.
     required
         Whether the questionnaire cannot be handed in before this is answered, or declined.
+    turned
+        Of a card with choices: what is asked where they stand the other way round, which is drawn
+        by chance too; empty where they always stand as they are.
     """
 
     name: str
@@ -63,6 +66,7 @@ class Item:
     words: tuple[tuple[float, str], ...] = ()
     numbered: bool = True
     card: bool = False
+    turned: str = ""
 
     @property
     def takes(self) -> str:
@@ -149,17 +153,38 @@ class Score:
 
 
 def shuffled(items: Sequence[Item], seed: int) -> list[Item]:
-    """Return items with the cards among them in an order drawn by chance; the others stay."""
+    """Return items with the cards among them in an order drawn by chance; the others stay.
+
+    Each card that can be turned is turned by chance.
+    """
     cards = [item for item in items if item.card]
-    random.Random(seed).shuffle(cards)  # noqa: S311 - nothing secret
-    drawn = iter(cards)
+    dice = random.Random(seed)  # noqa: S311 - nothing secret
+    dice.shuffle(cards)
+    drawn = iter(
+        [_turned(card) if card.turned and dice.random() < 1 / 2 else card for card in cards]
+    )
     return [next(drawn) if item.card else item for item in items]
 
 
-def in_order(items: Sequence[Item], order: str) -> Sequence[Item]:
-    """Return items in the order of their names in ``order``; as they come where it is empty."""
-    names = order.split()
-    return sorted(items, key=lambda item: names.index(item.name)) if names else items
+def in_order(items: Sequence[Item], order: str, turned: str = "") -> Sequence[Item]:
+    """Return items as the record says that they are shown.
+
+    They are in the order of their names in ``order``, as they come where it is empty; those named
+    in ``turned`` have their choices the other way round.
+    """
+    names, round_ = order.split(), turned.split()
+    shown = [_turned(item) if item.name in round_ else item for item in items]
+    return sorted(shown, key=lambda item: names.index(item.name)) if names else shown
+
+
+def _turned(card: Item) -> Item:
+    return replace(
+        card,
+        text=card.turned,
+        turned=card.text,
+        choices=card.choices[::-1],
+        labels=card.labels[::-1],
+    )
 
 
 def _written(answer: str) -> str:

@@ -42,7 +42,7 @@ class QuestionnaireForm:
     answered
         What was answered before the session stopped.
     seed
-        From which the order of its cards is drawn.
+        From which the order of its cards is drawn, and which of them are turned.
 
     Attributes
     ----------
@@ -71,7 +71,9 @@ class QuestionnaireForm:
         about = {**self._about, "title": self._questionnaire.title, "kept": kept}
         items = list(self._items.values())
         if any(item.card for item in items):  # whoever shows it follows the record
-            about["order"] = " ".join(item.name for item in shuffled(items, self._seed))
+            shown = shuffled(items, self._seed)
+            about["order"] = " ".join(item.name for item in shown)
+            about["turned"] = " ".join(item.name for item in shown if item not in items)
         return START, about
 
     def take(self, text: str, by: str) -> Said:

@@ -75,7 +75,7 @@ class Form:
             self._refreshers.append(lambda: said.set_text("" if session.consent else calm))
             return
         questionnaire = self._context.study.questionnaires[name]
-        items = list(in_order(questionnaire.items(), session.order))
+        items = list(in_order(questionnaire.items(), session.order, session.turned))
         ui.label(questionnaire.title).classes("form-title").props(HEADING)
         self._progress(items)
         cards = [self._item(name, item) for item in items]

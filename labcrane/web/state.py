@@ -126,7 +126,7 @@ class SessionView:
         self.things = ""
         self.counts: Counter[str] = Counter()
         self.form: str | None = None
-        self.order = ""
+        self.order = self.turned = ""
         self.form_version = 0
         self.answers: dict[str, Value] = {}
         self.refusal = ""
@@ -225,7 +225,8 @@ class SessionView:
     def _form(self, what: str, data: Mapping[str, Value]) -> None:
         match what:
             case "start":
-                self.form, self.order = str(data["questionnaire"]), str(data.get("order", ""))
+                self.form = str(data["questionnaire"])
+                self.order, self.turned = str(data.get("order", "")), str(data.get("turned", ""))
                 self.answers = json.loads(str(data["kept"]))
                 self.refusal = ""
                 self.form_version += 1

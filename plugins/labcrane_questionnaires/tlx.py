@@ -40,7 +40,9 @@ ENGLISH = TlxText(
 
 
 class NasaTlx(Questionnaire):
-    """Six ratings from 0 to 100 in steps of 5, and on request the fifteen pairs in drawn order.
+    """Six ratings from 0 to 100 in steps of 5, and on request the fifteen pairs.
+
+    Order and sides of the pairs are drawn by chance.
 
     ``raw`` is the mean of the six; ``weighted`` is the sum of rating times tally, over 15, the
     tally being how often a scale was chosen. Performance runs from good (0) to poor (100) and is
@@ -74,6 +76,7 @@ class NasaTlx(Questionnaire):
                 choices=(one, other),
                 labels=(titles[one], titles[other]),
                 card=True,
+                turned=text.pair.format(one=titles[other], other=titles[one]),
             )
             for one, other in PAIRS
         ]

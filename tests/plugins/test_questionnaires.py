@@ -9,7 +9,8 @@ from pydantic import ValidationError
 from rehearsal import SHORT, ScriptedConsole, a_study
 
 from labcrane import ProtocolError, Questionnaire
-from labcrane.core import AnswerError, Item
+from labcrane.cli.questionnaire import Sheets
+from labcrane.core import AnswerError, Event, Item
 from labcrane.core.items import in_order
 from labcrane.protocol.questions import questions
 from labcrane.replay import replay_session
@@ -383,6 +384,32 @@ def test_pairs_come_in_an_order_drawn_by_chance_that_is_recorded() -> None:
         orders.append(order)
     assert len({order[6] for order in orders}) > 8, "any of fifteen may be first"
     assert "order" not in QuestionnaireForm("sus", BUILT["sus"], {"step": 1}).begin()[1]
+
+
+def test_which_title_of_a_pair_stands_left_is_drawn_by_chance_and_recorded() -> None:
+    tlx = NasaTlx(TlxSettings(weighted=True))
+    plain = {item.name: item for item in tlx.items()}
+    lefts: dict[str, set[str]] = {}
+    share = []
+    for seed in range(40):
+        _, data = QuestionnaireForm("tlx", tlx, {"step": 1}, seed=seed).begin()
+        shown = in_order(tlx.items(), str(data["order"]), str(data["turned"]))
+        sheet = Sheets({"tlx": tlx})(Event("questionnaire.start", 0.0, data), None)
+        assert sheet.items() == shown, "the terminal shows what the page shows"
+        assert shown[:6] == tlx.items()[:6], "ratings stay"
+        share.append(len(str(data["turned"]).split()) / len(PAIRS))
+        for card in shown[6:]:
+            was = plain[card.name]
+            assert sorted(card.choices) == sorted(was.choices)
+            assert card.check(was.choices[0]) == was.choices[0]
+            titles = dict(zip(was.choices, was.labels, strict=True))
+            assert card.labels == tuple(titles[choice] for choice in card.choices)
+            assert card.text.endswith(": {} or {}?".format(*card.labels))
+            lefts.setdefault(card.name, set()).add(card.choices[0])
+    assert all(lefts[f"{one}_or_{other}"] == {one, other} for one, other in PAIRS)
+    assert 0.4 < sum(share) / len(share) < 0.6
+    before = in_order(tlx.items(), " ".join(plain))
+    assert before == list(plain.values()), "a record from before says nothing of sides"
 
 
 GERMAN = """\
