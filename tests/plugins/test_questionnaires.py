@@ -357,6 +357,14 @@ def test_cr10_takes_decimals_and_numbers_above_ten(tmp_path: Path) -> None:
             item.check(wrong)
 
 
+def test_a_study_that_expects_more_than_cr10_takes_asks_its_own_question() -> None:
+    words = {0: "nothing", 0.3: "a trace", 10: "extreme"}
+    question = {"name": "a", "text": "A", "highest": 100, "step": 0, "words": words}
+    settings = FreeSettings.model_validate({"title": "T", "questions": [question]})
+    (item,) = Free(settings).items()
+    assert [item.check(rating) for rating in (0.3, 12.5, 40)] == [0.3, 12.5, 40.0]
+
+
 def test_the_load_index_defines_its_scales_whole_and_shows_no_numbers() -> None:
     items = NasaTlx(TlxSettings()).items()
     assert [item.text.partition(":")[0] for item in items] == [
