@@ -1,5 +1,6 @@
 """Settings of the tone."""
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
@@ -20,7 +21,17 @@ MOST_OVERTONES = 15
 LOWEST_HZ, HIGHEST_HZ = 40.0, 10_000.0
 """Between which fundamentals grown-ups hear a sine from any loudspeaker."""
 
+FULL_SCALE = 1.0
+"""Largest amplitude that a sound device plays; what is above is cut off, and heard as noise."""
+
+ROUNDING = 1e-9
+
 FEWEST_SAMPLES, MOST_SAMPLES = 8000, 192_000
+
+
+def sum_of_partials(overtones: int) -> float:
+    """Return what fundamental and overtones add up to, where the fundamental is 1."""
+    return sum(1.0 / number for number in range(1, 2 + overtones))
 
 
 class SonificationSettings(Settings):
@@ -42,7 +53,7 @@ class SonificationSettings(Settings):
 
     level: tuple[float, float] = (0.3, 0.3)
     """Amplitude of the fundamental far away and at the target, 0 to 1, where the tone is softest;
-    see ``weighting``."""
+    see ``weighting``. Overtones add to it: 1/2, 1/3 and so on of it, and all may be 1 together."""
 
     weighting: Literal["a", "none"] = "a"
     """``a`` lowers the tone wherever the ear hears its partials better, so that at one ``level`` it
@@ -142,5 +153,23 @@ class SonificationSettings(Settings):
             few, many = self.overtones
             raise WrongKey(
                 f"overtones must be 0 to {MOST_OVERTONES}, but are {few}, {many}", at=("overtones",)
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _is_not_cut_off(self, info: ValidationInfo) -> "SonificationSettings":
+        if was_run(info) or max(self.level) * sum_of_partials(max(self.overtones)) <= FULL_SCALE:
+            return self
+        from labcrane_sonification.tone import loudest  # noqa: PLC0415 - it loads numpy
+
+        amplitude, distance = loudest(self)
+        if amplitude > FULL_SCALE + ROUNDING:
+            possible = [math.floor(100 * each / amplitude) / 100 for each in self.level]
+            raise WrongKey(
+                f"level is {self.level[0]:g}, {self.level[1]:g}, and the fundamental and its "
+                f"overtones add up to {amplitude:.4g} at {distance:.3g} m from the target, where "
+                f"{FULL_SCALE:g} is all that can be played and the rest is cut off; write level: "
+                f"[{possible[0]:g}, {possible[1]:g}], or fewer overtones",
+                at=("level",),
             )
         return self

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane import DeviceError
-from labcrane_sonification.settings import SonificationSettings
+from labcrane_sonification.settings import FULL_SCALE, SonificationSettings
 from labcrane_sonification.tone import Tone, gains
 
 os.environ.setdefault("PYO_GUI_WX", "0")  # pyo looks for a GUI when it is imported
@@ -21,8 +21,6 @@ with redirect_stdout(io.StringIO()):  # where there is no GUI it advertises one,
     import pyo
 
 CHANNELS = 2
-LIMIT = 0.98
-"""Where the sum of all partials is limited: 16 partials of full level would be 3.4."""
 
 
 def server(settings: SonificationSettings) -> Any:
@@ -114,7 +112,8 @@ class Synth:
         self._partials = [
             pyo.Sine(freq=self._pitch * (n + 1), mul=level) for n, level in enumerate(self._levels)
         ]
-        self._sum = pyo.Clip(pyo.Mix(self._partials, voices=1), min=-LIMIT, max=LIMIT)
+        mixed = pyo.Mix(self._partials, voices=1)
+        self._sum = pyo.Clip(mixed, min=-FULL_SCALE, max=FULL_SCALE)  # of what was once recorded
         self._out = [(self._sum * side).out(channel) for channel, side in enumerate(self._sides)]
 
     def sound(self, wanted: Tone) -> None:

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from labcrane import FloatArray
-from labcrane_sonification.settings import SonificationSettings
+from labcrane_sonification.settings import SonificationSettings, sum_of_partials
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,20 @@ def tone(settings: SonificationSettings, distance: float, aside: float, inside_s
 
 
 STEPS = 400
-"""Distances at which the softest tone is looked for."""
+"""Distances at which the softest and the loudest tone are looked for."""
+
+
+def loudest(settings: SonificationSettings) -> tuple[float, float]:
+    """Return the largest sum of the partials' amplitudes, and at which distance in metres it is.
+
+    No sample is larger, however the partials lie to each other; ``weighting`` can only lower it.
+    """
+    with np.errstate(all="ignore"):  # of pitches that nobody hears, and that a check asks about
+        if not softest(settings.pitch_hz, settings.overtones) > 0.0:
+            return max(settings.level) * sum_of_partials(max(settings.overtones)), 0.0
+        ways: Sequence[float] = np.linspace(0.0, settings.far, STEPS + 1).tolist()
+        tones = [(tone(settings, distance, 0.0, 0.0), distance) for distance in ways]
+    return max((made.level * sum_of_partials(int(made.overtones)), at) for made, at in tones)
 
 
 def weighted(hertz: FloatArray) -> FloatArray:

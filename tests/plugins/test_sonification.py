@@ -18,7 +18,7 @@ from labcrane.testing import TARGETS, FeedbackContract, ch8, make_run, make_targ
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.sonification import Sonification
 from labcrane_sonification.synth import Synth, offline_server
-from labcrane_sonification.tone import Tone, gains, tone, weighted
+from labcrane_sonification.tone import Tone, gains, loudest, tone, weighted
 from labcrane_sphere.settings import SphereSettings
 
 RATE = 48000
@@ -70,10 +70,10 @@ def test_exchanged_pitches_are_the_other_polarity() -> None:
 
 
 def test_overtones_and_level_go_from_far_to_near() -> None:
-    settings = SonificationSettings(far=5.0, overtones=(0, 5), level=(0.1, 0.6), weighting="none")
+    settings = SonificationSettings(far=5.0, overtones=(0, 5), level=(0.1, 0.4), weighting="none")
     tones = [tone(settings, float(distance), 0.0, 0.0) for distance in range(6)]
     assert [t.overtones for t in tones] == [5, 4, 3, 2, 1, 0]
-    np.testing.assert_allclose([t.level for t in tones], [0.6, 0.5, 0.4, 0.3, 0.2, 0.1])
+    np.testing.assert_allclose([t.level for t in tones], [0.4, 0.34, 0.28, 0.22, 0.16, 0.1])
 
 
 @pytest.mark.parametrize(("pan", "sign"), [("towards", -1.0), ("away", 1.0), ("none", 0.0)])
@@ -291,6 +291,32 @@ def test_at_one_level_the_tone_is_equally_loud_at_every_distance() -> None:
                 levels.setdefault(weighting, []).append(level_of(blocks(synth, 0.4)[:, 0]))
     assert np.ptp(levels["a"]) < 1.0  # the table is read between its octaves
     assert np.ptp(levels["none"]) > 10.0
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said", "right"),
+    [
+        ({"level": (1.0, 1.0), "pitch_hz": (880.0, 220.0)},
+         "level is 1, 1, and the fundamental and its overtones add up to 2.45 at 0 m from the "
+         r"target, where 1 is all .* write level: \[0.4, 0.4\], or fewer overtones",
+         {"level": (0.4, 0.4)}),
+        ({"overtones": (15, 15), "weighting": "none"}, r"add up to 1\.014 .* level: \[0.29, 0.29\]",
+         {"level": (0.29, 0.29)}),
+    ],
+)  # fmt: skip
+def test_a_tone_louder_than_full_scale_is_refused_with_a_level_that_can_be_played(
+    wrong: dict[str, object], said: str, right: dict[str, object]
+) -> None:
+    with pytest.raises(ValidationError, match=said):
+        SonificationSettings.model_validate(wrong)
+    assert SonificationSettings.model_validate({**wrong, **right})
+    was_run = SonificationSettings.model_validate(wrong, context={"recorded": True})
+    assert was_run.overtones == wrong.get("overtones", (0, 5))
+
+
+def test_a_level_of_1_that_weighting_lowers_where_there_are_overtones_can_be_played() -> None:
+    amplitude, distance = loudest(SonificationSettings(level=(1.0, 1.0)))
+    assert (amplitude, distance) == (pytest.approx(1.0), pytest.approx(4.0))
 
 
 def test_what_was_recorded_without_a_weighting_had_none() -> None:
