@@ -137,3 +137,56 @@ def test_a_scale_whose_steps_have_words_is_a_list_of_them(
             )
             assert wide == 0, f"words are cut at {width} px"
         photograph(browser, "worded")
+
+
+TENTHS = """\
+  worded:
+    use: free
+    title: How often
+    questions:
+      - name: often
+        text: How often?
+        highest: 1
+        step: 0.1
+        words: {0: never, 0.3: seldom, 0.6: often, 0.7: mostly, 1: always}
+"""
+
+
+def test_words_at_tenths_are_all_on_the_page_and_the_step_that_is_answered_is_marked(
+    tmp_path: Path, browser: webdriver.Chrome
+) -> None:
+    with pages(tmp_path, TENTHS) as told:
+        asked(told, browser, "worded")
+        steps = browser.find_elements(By.CSS_SELECTOR, ".form-steps button")
+        said = [" ".join(each.text.split()) for each in steps]
+        assert said == [
+            "0 never", "0.1", "0.2", "0.3 seldom", "0.4", "0.5", "0.6 often", "0.7 mostly", "0.8",
+            "0.9", "1 always",
+        ]  # fmt: skip
+        told.happens(("questionnaire.answer", {"item": "often", "value": 0.3}))
+        wait_for(lambda: steps[3].get_attribute("aria-pressed") == "true")
+
+
+def test_the_titles_of_a_pair_stand_on_the_sides_that_the_record_says(
+    tmp_path: Path, browser: webdriver.Chrome
+) -> None:
+    weighted = "  pairs: {use: nasa_tlx, weighted: true}\n"
+    with pages(tmp_path, weighted) as told:
+        items = load(told.order.protocol, discover()).questionnaires["pairs"].items()
+        order = " ".join(item.name for item in items)
+        opened(browser, told.links["participant"])
+        start = {"questionnaire": "pairs", "title": "Load", "kept": "{}", "order": order}
+        told.happens(
+            ("consent.given", {"version": "a", "by": "participant"}),
+            ("questionnaire.start", {**start, "turned": "mental_or_effort"}),
+        )
+        wait_for(lambda: text(browser, "answered"))
+        for name, titles in (
+            ("mental_or_physical", ["Mental demand", "Physical demand"]),
+            ("mental_or_effort", ["Effort", "Mental demand"]),
+        ):
+            card = browser.find_element(By.ID, f"item-{name}")
+            buttons = card.find_elements(By.CSS_SELECTOR, ".form-choices button")
+            assert [each.text for each in buttons] == titles
+            asks = text(browser, f"asked-{name}")
+            assert asks.endswith(": {} or {}?".format(*titles))
