@@ -68,7 +68,7 @@ class Settings(StrictModel):
         """Return what everyone who sees or hears the component learns of the task's error.
 
         A fact each, nothing by default; components that tell the same use the same words. What
-        these settings make constant is no fact, and one that is told up to a distance is
+        these settings make constant is not a fact, and one told up to a distance is
         :class:`Within` it. What reveals something is feedback, and belongs to the design:
         ``labcrane check`` asks about it where it is always there, in every group, and where groups,
         conditions or blocks of one task are told different facts.
