@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Participant
-from labcrane.analysis.presented import LOG
 from labcrane.errors import RecordingError, nearest
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
+from labcrane.recording.pictures import LOG
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,6 +11,7 @@ from pydantic import PositiveFloat
 
 from labcrane.core.findings import Finding, Verdict
 from labcrane.core.settings import Settings
+from labcrane.recording.pictures import LOG, RATE_S
 
 if TYPE_CHECKING:  # a protocol is checked without loading what computes
     import pandas as pd
@@ -18,10 +19,12 @@ if TYPE_CHECKING:  # a protocol is checked without loading what computes
     from labcrane.recording.participant_file.reader import SessionRecord
     from labcrane.types import FloatArray
 
-LOG = "labcrane.feedback."
 SILENT_S = 2.0
 """The recorder says once a second how streams are: a view that hangs is told from one about which
 nothing was heard yet after so long."""
+
+ROUNDING_S = 1e-6
+"""A picture exactly a second after another one is within that second."""
 
 FAILED = 0.05
 """Share of a session's movements above which the data deserve a look, and not the report alone."""
@@ -34,16 +37,16 @@ class PresentedLimits(Settings):
     """How much of a movement the operator must have been shown; with less it counts for nothing."""
 
     min_hz: PositiveFloat = 15.0
-    """Fewest pictures a second, over the whole movement. Below about 15 people steer and place
-    measurably worse (Chen and Thropp, 2007, IEEE Transactions on Systems, Man, and Cybernetics A
-    37, 1063-1076); a processor that draws reaches 25."""
+    """Fewest pictures in any one second of the movement; a shorter movement is judged whole. Below
+    about 15 people steer and place measurably worse (Chen and Thropp, 2007, IEEE Transactions on
+    Systems, Man, and Cybernetics A 37, 1063-1076); a processor that draws reaches 25."""
 
     max_gap_s: PositiveFloat = 0.25
     """Longest time without a new picture, or with a sound that had failed, in seconds: about a
-    visual reaction time."""
+    visual reaction time. A second without a picture is too little by `min_hz` in any case."""
 
     def too_little(self, rate_hz: float, longest_s: float) -> bool:
-        """Whether so few pictures a second, or so long without one, is too little."""
+        """Whether so few pictures in the worst second, or so long without one, is too little."""
         return rate_hz < self.min_hz or longest_s > self.max_gap_s
 
     def complaint(self, rate_hz: float | None, silent_s: float | None) -> str:
@@ -52,13 +55,13 @@ class PresentedLimits(Settings):
         Parameters
         ----------
         rate_hz
-            Pictures a second over the last seconds; None where it is not known.
+            Pictures in the last second; None where it is not known.
         silent_s
             How long ago the last picture was, in seconds; None before the first.
         """
         if silent_s is None:
             return "has shown no picture yet"
-        if silent_s > max(SILENT_S, self.max_gap_s):
+        if silent_s > max(SILENT_S, self.max_gap_s) or rate_hz == 0.0:
             return f"has shown no picture for {silent_s:.0f} s"
         if rate_hz is not None and rate_hz < self.min_hz:
             return f"shows {rate_hz:.1f} pictures a second, and {self.min_hz:g} are needed"
@@ -70,6 +73,11 @@ PRESENTED: Mapping[str, tuple[str, str]] = {
         "1",
         "pictures that the operator's view showed from the trial's start to its end, pauses left "
         "out; of several views, those of the one that showed fewest",
+    ),
+    "fewest_pictures": (
+        "Hz",
+        "fewest pictures that it showed in any one second, pauses left out; in a shorter trial, "
+        "those of the whole, per second",
     ),
     "longest_without_picture": (
         "s",
@@ -138,12 +146,15 @@ def presented(session: "SessionRecord") -> "pd.DataFrame | None":
     failed = np.array(silent) > limits.max_gap_s
     if views:
         shown = [_shown(session, name, clock, *spans) for name in views]
-        table["pictures"] = pd.DataFrame([count for count, _ in shown]).min().to_numpy()
-        longest = pd.DataFrame([gap for _, gap in shown]).max()
-        table["longest_without_picture"] = longest.to_numpy()
+        counts, fewest, longest = (np.array(each) for each in zip(*shown, strict=True))
+        table["pictures"] = counts.min(axis=0)
+        table["fewest_pictures"] = fewest.min(axis=0)
+        table["longest_without_picture"] = longest.max(axis=0)
         failed |= [
-            limits.too_little(count / max(until - since, 1.0 / clock.rate_hz), gap)
-            for count, gap, since, until in zip(table["pictures"], longest, *spans, strict=True)
+            limits.too_little(rate, gap)
+            for rate, gap in zip(
+                table["fewest_pictures"], table["longest_without_picture"], strict=True
+            )
         ]
     table["presentation_failed"] = failed.astype(float)
     return table
@@ -178,18 +189,38 @@ class _Clock:
 
 def _shown(
     session: "SessionRecord", name: str, clock: _Clock, since: "FloatArray", until: "FloatArray"
-) -> "tuple[list[int], list[float]]":
-    """Return how many pictures a view showed of each movement, and the longest time without one."""
+) -> "tuple[list[int], list[float], list[float]]":
+    """Return of each movement how many pictures a view showed, and the worst of it.
+
+    That is how many a second it showed at worst, and the longest time without one.
+    """
     import numpy as np
 
     stream = session.streams.get(LOG + name)
     shown = clock.running(np.empty(0) if stream is None else np.sort(stream.time))
     edges = np.searchsorted(shown, since), np.searchsorted(shown, until, side="right")
-    counts, gaps = [], []
+    counts, fewest, gaps = [], [], []
     for first, last, began, over in zip(*edges, since, until, strict=True):
-        counts.append(int(last - first))
-        gaps.append(float(np.diff(np.r_[began, shown[first:last], over]).max()))
-    return counts, gaps
+        own = shown[first:last]
+        counts.append(len(own))
+        fewest.append(_fewest(own, began, max(over, began + 1.0 / clock.rate_hz)))
+        gaps.append(float(np.diff(np.r_[began, own, over]).max()))
+    return counts, fewest, gaps
+
+
+def _fewest(shown: "FloatArray", began: float, over: float) -> float:
+    """Return pictures a second in the worst ``RATE_S`` from ``began`` to ``over``.
+
+    A stretch has fewest where it begins just after a picture, or where the movement does.
+    """
+    import numpy as np
+
+    if over - began <= RATE_S:
+        return len(shown) / (over - began)
+    after = np.flatnonzero(shown + RATE_S <= over)
+    until = np.searchsorted(shown, shown[after] + RATE_S + ROUNDING_S, side="right")
+    first = np.searchsorted(shown, began + RATE_S + ROUNDING_S, side="right")
+    return float(min(first, (until - after - 1).min(initial=first)) / RATE_S)
 
 
 def _switched_on(trials: "pd.DataFrame", sounds: set[str]) -> list[set[str]]:
@@ -248,13 +279,16 @@ def not_presented(movements: "pd.DataFrame") -> "pd.Series[bool]":
 
 
 def in_words(movement: Mapping[Hashable, Any]) -> str:
-    """Return what was shown of a movement: ``12 pictures shown, none for 3.21 s``.
+    """Return what was shown of a movement.
+
+    ``412 pictures shown, 5 in the worst second, none for 0.20 s``.
 
     What had failed is named too: ``feedback lost for 2.50 s``.
     """
     found, gap = [], movement["longest_without_picture"]
     if movement["pictures"] == movement["pictures"]:  # a number: there is a view
-        found.append(f"{movement['pictures']:.0f} pictures shown, none for {gap:.2f} s")
+        worst = f"{movement['fewest_pictures']:.3g} in the worst second"
+        found.append(f"{movement['pictures']:.0f} pictures shown, {worst}, none for {gap:.2f} s")
     if movement["feedback_lost"]:
         found.append(f"feedback lost for {movement['feedback_lost']:.2f} s")
     return ", ".join(found)

@@ -26,6 +26,7 @@ from labcrane.protocol.references import twice
 from labcrane.protocol.steps import READING_S, Block
 from labcrane.protocol.streams import SHARES
 from labcrane.protocol.study import Study, trials_of
+from labcrane.recording.pictures import RATE_S
 from labcrane.streams.markers import LEARNT_LATE
 
 _AT = re.compile(r"(.+?):(\d+)(?::(\d+))?: (.*)")
@@ -452,7 +453,8 @@ def _of_what_nobody_sees(study: Study) -> Doubts:
 
 def _of_slow_views(study: Study) -> Doubts:
     """Question views that are to show fewer pictures than a movement needs to count."""
-    least, folder = study.protocol.presented.min_hz, study.path.parent
+    limits, folder = study.protocol.presented, study.path.parent
+    least = limits.min_hz
     views = {f"views.{name}": choice.described(folder) for name, choice in study.views.items()}
     for name in operators_views(views):
         rate = views[f"views.{name}"]["settings"].get("rate_hz")
@@ -462,6 +464,13 @@ def _of_slow_views(study: Study) -> Doubts:
                 f"view {name!r} shows {rate:g} pictures a second, and presented asks for "
                 f"{least:g}, so that no movement counts; write presented: {{min_hz: {rate / 2:g}}}",
             )
+    if limits.max_gap_s > RATE_S and operators_views(views):
+        yield (
+            ("presented", "max_gap_s"),
+            f"presented allows {limits.max_gap_s:g} s without a picture, and min_hz asks for "
+            f"pictures in every {RATE_S:g} s, so that {RATE_S:g} s without one leaves a movement "
+            f"out; write presented: {{max_gap_s: {RATE_S:g}}}",
+        )
 
 
 def _audiences(study: Study) -> Iterator[Sequence[str]]:

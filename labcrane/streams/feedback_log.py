@@ -15,6 +15,7 @@ import numpy as np
 from labcrane.core.records import Frame
 from labcrane.core.roles import Feedback
 from labcrane.core.signals import Layout
+from labcrane.recording.pictures import LOG
 from labcrane.streams.outlets import SampleOutlet, channel, source_id, stream_info
 from labcrane.types import FloatArray
 
@@ -23,7 +24,7 @@ HEAD = (("frame.tick", "1"), ("frame.due", "s"), ("frame.skipped", "1"))
 
 def log_name(name: str, stream: str = "") -> str:
     """Return the name of the stream in which feedback ``name`` says what it presented."""
-    return f"labcrane.feedback.{name}" + (f".{stream}" if stream else "")
+    return f"{LOG}{name}" + (f".{stream}" if stream else "")
 
 
 def log_source(source: str, name: str, stream: str = "") -> str:

@@ -103,6 +103,8 @@ UNLIKE = [
         ([("sessions:", GROUPS)], "design.groups", "no block has feedback: group"),
         ([("sessions:", "views: {v: {use: view, rate_hz: 10}}\nsessions:")], "views.v.rate_hz",
          "shows 10 pictures a second, and presented asks for 15, so that no movement counts"),
+        ([("sessions:", "views: {v: {use: view}}\npresented: {max_gap_s: 2}\nsessions:")], "presented.max_gap_s",
+         "presented allows 2 s without a picture, and min_hz asks for pictures in every 1 s"),
         ([("sessions:", BALL)], "feedback.ball", "the operator has none, so that nobody sees it"),
         ([("sessions:", f"views: {{desk: {{use: view, seen_by: examiner, hud: []}}}}\n{BALL}")], "feedback.ball",
          "add one, as views: {operator: {use: view}}"),

@@ -13,6 +13,7 @@ from labcrane.analysis.measures import measure_session
 from labcrane.analysis.presented import (
     PRESENTED,
     PresentedLimits,
+    _fewest,
     not_presented,
     operators_views,
     presented,
@@ -24,6 +25,8 @@ from labcrane.analysis.statistics.time_outs import time_outs
 from labcrane.core.findings import Verdict, worst
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Message, Order
+from labcrane.streams.feedback_log import log_name
+from labcrane.streams.recorder.health import Flow, rate_of
 from results.recorded import STUDY, record, study
 from results.synthetic import cohort_of_36
 
@@ -82,7 +85,9 @@ def test_what_was_shown_of_a_movement_is_what_goes_by_tick_by_tick(
     assert np.abs(table["pictures"] - np.array(counts)).max() <= 1  # at the edge of a pause
     np.testing.assert_allclose(table["longest_without_picture"], longest, atol=2.01 / RATE_HZ)
     seconds = session.trials["ended"] - session.trials["started"] - session.trials["paused"]
-    failed = (table["longest_without_picture"] > 0.25) | (table["pictures"] / seconds < 15.0)
+    seconds = seconds.clip(upper=1.0)  # in a second of each, at most what there was in all
+    assert (table["fewest_pictures"] <= table["pictures"] / seconds + 1e-9).all()
+    failed = (table["longest_without_picture"] > 0.25) | (table["fewest_pictures"] < 15.0)
     assert table["presentation_failed"].tolist() == failed.astype(float).tolist()
     assert 0 < failed.sum() < len(table)
 
@@ -113,8 +118,56 @@ def test_a_movement_is_left_out_by_reason_where_one_of_two_views_stood_still(
     others = table[~not_presented(table)]
     assert others["longest_without_picture"].max() == pytest.approx(1 / 60, abs=1e-3)
     (why,) = exclusions(table)["why"]
-    assert why == f"outcome success, {row['pictures']:.0f} pictures shown, none for 2.02 s"
+    assert why == (
+        f"outcome success, {row['pictures']:.0f} pictures shown, 0 in the worst second, "
+        "none for 2.02 s"
+    )
     assert (is_result(table) == ~not_presented(table)).all()
+
+
+def test_a_slow_second_leaves_out_a_movement_that_was_fast_before_and_after(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "before"
+    third = recorded(folder, {"cab": drawn(1)}).trials.iloc[2]
+    slow, over = third["started"] + 0.5, third["started"] + 2.0
+    fast = np.arange(90.0, 400.0, 1 / 120)
+    shown = np.r_[fast[fast < slow], np.arange(slow, over, 0.19), fast[fast > over]]
+    session = recorded(tmp_path / "slow", {"cab": shown})
+    table = measure_session(session).assign(participant="P001", session=1)
+    row = table.iloc[2]
+    assert row["pictures"] / (third["ended"] - third["started"]) > 40.0
+    assert row["longest_without_picture"] == pytest.approx(0.19)
+    assert row["fewest_pictures"] == 5.0
+    assert not_presented(table).tolist() == [number == 2 for number in range(len(table))]
+    (why,) = exclusions(table)["why"]
+    assert why.endswith(" pictures shown, 5 in the worst second, none for 0.19 s")
+    (finding,) = session.sync_report["presented"]
+    assert "5 in the worst second" in finding["text"]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_fewest_pictures_are_those_of_the_worst_second_wherever_it_begins(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    shown = np.sort(random.uniform(10.0, 16.0, random.integers(0, 60)))
+    every = np.arange(10.0, 15.0, 1e-3)
+    worst = min(np.searchsorted(shown, every + 1.0) - np.searchsorted(shown, every))
+    assert _fewest(shown, 10.0, 16.0) == pytest.approx(worst, abs=1.0)
+    assert _fewest(shown, 10.0, 16.0) <= worst
+    early = shown[shown < 10.5]
+    assert _fewest(early, 10.0, 10.5) == len(early) / 0.5, "shorter than a second: the whole"
+
+
+def test_the_lamp_counts_the_same_seconds_as_the_table() -> None:
+    flow = Flow()
+    for time in (*np.arange(0.0, 4.0, 1 / 120), *np.arange(4.0, 5.3, 0.2)):
+        flow.came(time, 1)
+    assert rate_of(log_name("cab"), flow, 5.25) == 5.0
+    assert rate_of("eyes", flow, 5.25) > 60.0
+    assert rate_of(log_name("cab"), flow, 0.9) is None
+    limits = PresentedLimits()
+    assert limits.complaint(5.0, 0.1) == "shows 5.0 pictures a second, and 15 are needed"
+    assert limits.too_little(5.0, 0.2)
 
 
 def test_the_sync_report_names_movements_that_were_not_shown(
@@ -255,6 +308,7 @@ def test_a_view_is_complained_about_as_it_is_now() -> None:
     assert limits.complaint(24.6, 0.2) == ""
     assert limits.complaint(None, 0.2) == ""
     assert limits.complaint(2.04, 0.4) == "shows 2.0 pictures a second, and 15 are needed"
+    assert limits.complaint(0.0, 1.2) == "has shown no picture for 1 s"
     assert limits.complaint(24.6, 3.2) == "has shown no picture for 3 s"
     assert limits.complaint(None, None) == "has shown no picture yet"
     assert PresentedLimits(max_gap_s=5.0).complaint(24.6, 3.2) == ""

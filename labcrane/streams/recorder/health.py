@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from labcrane.recording.pictures import LOG, RATE_S
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.streams.probes import Probe
 
@@ -115,6 +116,18 @@ def rate(flow: "Flow", now: float) -> float | None:
         return None
     (first, before), (last, after) = recent[0], recent[-1]
     return (after - before) / (last - first) if last > first else None
+
+
+def picture_rate(flow: "Flow", now: float) -> float | None:
+    """Return pictures a second over the last ``RATE_S``; None before they came for so long."""
+    arrivals = list(flow.arrivals)
+    before = [count for time, count in arrivals if time <= now - RATE_S]
+    return (arrivals[-1][1] - before[-1]) / RATE_S if before else None
+
+
+def rate_of(name: str, flow: "Flow", now: float) -> float | None:
+    """Return the rate of the stream ``name``: that of pictures where it tells of a view."""
+    return (picture_rate if name.startswith(LOG) else rate)(flow, now)
 
 
 def condition(flow: "Flow", header: StreamHeader | None, now: float) -> Condition:

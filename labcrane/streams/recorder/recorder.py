@@ -15,7 +15,7 @@ from labcrane.recording.paths import next_part, part_path
 from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.recorder.absence import PATIENCE_S, FreePorts, absent, missed
 from labcrane.streams.recorder.candidates import Candidate, question
-from labcrane.streams.recorder.health import Condition, Health, complaints, condition, rate
+from labcrane.streams.recorder.health import Condition, Health, complaints, condition, rate_of
 from labcrane.streams.recorder.inlet import Inlet
 from labcrane.streams.recorder.own_clock import read_own_clock
 from labcrane.streams.recorder.signal_feed import SignalFeed
@@ -289,7 +289,7 @@ def _health(recorded: _Recorded, now: float, rivals: list[str]) -> Health:
         required=recorded.request.required,
         condition=condition(flow, inlet.header, now),
         samples=flow.samples,
-        rate_hz=rate(flow, now),
+        rate_hz=rate_of(info.name(), flow, now),
         nominal_hz=info.nominal_srate(),
         channels=info.channel_count(),
         silent_s=now - flow.last if flow.samples else None,

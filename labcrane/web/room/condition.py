@@ -4,7 +4,8 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from labcrane.analysis.presented import LOG, PresentedLimits
+from labcrane.analysis.presented import PresentedLimits
+from labcrane.recording.pictures import LOG
 from labcrane.session.standing import EXAMINER, STOP, SessionStage
 from labcrane.web.live import Live
 from labcrane.web.state import SessionView

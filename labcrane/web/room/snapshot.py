@@ -5,12 +5,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from labcrane.analysis.presented import LOG, operators_views
+from labcrane.analysis.presented import operators_views
 from labcrane.core.records import Event
 from labcrane.core.signals import Signal
 from labcrane.design.counts import TrialCounts
 from labcrane.protocol.questions import about, questions
 from labcrane.protocol.study import Study
+from labcrane.recording.pictures import LOG
 from labcrane.web.page import PageContext
 from labcrane.web.room.bars import groups
 from labcrane.web.room.buttons import answers, buttons

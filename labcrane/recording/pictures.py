@@ -1,0 +1,12 @@
+"""Pictures of a view: the stream that says when each was shown, and over what their rate is.
+
+The examiner's lamp judges a view while a session runs, and the tables judge it afterwards. Both use
+this one number, so that they agree.
+"""
+
+LOG = "labcrane.feedback."
+"""What the names of streams begin with in which views and sounds say what they presented."""
+
+RATE_S = 1.0
+"""The rate of pictures is how many were shown in so many seconds. Over the whole of a movement a
+fast part would hide a slow one."""
