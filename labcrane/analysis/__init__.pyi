@@ -17,12 +17,14 @@ from .gaze import Glass, fixations_of, glass_of, with_unseen_areas
 from .gaze_streams import gaze_space
 from .measures import measures_of
 from .movements import Movement, events_of, movements_of
+from .presented import PRESENTED, presentation_failed
 from .questionnaires import answers_of, asked_in, beside_trials, scores_of
 from .tables.annotations import annotations_of
 from .tables.dataset import Dataset, open_dataset
 
 __all__ = [
     "EEG_READERS",
+    "PRESENTED",
     "Dataset",
     "Exporter",
     "Glass",
@@ -46,6 +48,7 @@ __all__ = [
     "measures_of",
     "movements_of",
     "open_dataset",
+    "presentation_failed",
     "sampled",
     "scores_of",
     "to_mne",

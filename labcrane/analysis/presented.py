@@ -11,6 +11,7 @@ from pydantic import PositiveFloat
 
 from labcrane.core.findings import Finding, Verdict
 from labcrane.core.settings import Settings
+from labcrane.recording.labels import Attempt, attempt_of
 from labcrane.recording.pictures import LOG, RATE_S
 
 if TYPE_CHECKING:  # a protocol is checked without loading what computes
@@ -276,6 +277,18 @@ def not_presented(movements: "pd.DataFrame") -> "pd.Series[bool]":
     if "presentation_failed" not in movements:
         return pd.Series(data=False, index=movements.index, dtype=bool)
     return movements["presentation_failed"] == 1.0
+
+
+def presentation_failed(session: "SessionRecord") -> dict[Attempt, bool]:
+    """Return of each attempt in the trial table whether the operator was shown too little.
+
+    Nothing where nothing was to be shown.
+    """
+    table = presented(session)
+    if table is None:
+        return {}
+    rows = map(attempt_of, session.trials.to_dict("records"))
+    return dict(zip(rows, map(bool, not_presented(table)), strict=True))
 
 
 def in_words(movement: Mapping[Hashable, Any]) -> str:

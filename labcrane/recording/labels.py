@@ -3,7 +3,7 @@
 docs/markers.md says how they are made; :data:`KNOWN` says what each means, also in HED.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from labcrane.core.records import UNDONE, Event
@@ -118,10 +118,15 @@ class Labels:
     ----------
     void
         Trial and attempt of those that count for nothing, as far as that is known by now.
+    unseen
+        Those in which the operator was shown too little, as far as that is known.
     """
 
-    def __init__(self, void: frozenset[Attempt] = frozenset()) -> None:
+    def __init__(
+        self, void: frozenset[Attempt] = frozenset(), unseen: Collection[Attempt] = ()
+    ) -> None:
         self._void = void
+        self._unseen = unseen
         self._block: tuple[str, ...] = ()
         self._trial: tuple[str, ...] = ()
 
@@ -155,19 +160,31 @@ class Labels:
     def _about(self, data: Mapping[str, Any]) -> tuple[str, ...]:
         uncounted = ("uncounted",) if data.get("counted") is False else ()
         void = ("void",) if attempt_of(data) in self._void else ()
-        return (*_block(data), *uncounted, *void, *_levels(data))
+        unseen = ("presentation_failed",) if attempt_of(data) in self._unseen else ()
+        return (*_block(data), *uncounted, *void, *unseen, *_levels(data))
 
 
-def labelled(events: Sequence[tuple[str, Mapping[str, Any]]]) -> list[str]:
+def labelled(
+    events: Sequence[tuple[str, Mapping[str, Any]]], failed: Mapping[Attempt, bool] | None = None
+) -> list[str]:
     """Return the labels of a whole session's events, by name and data, in order.
 
-    Attempts that turned out to count for nothing are ``void`` from their start on.
+    Attempts that turned out to count for nothing are ``void`` from their start on, and those of
+    which the operator was shown too little are ``presentation_failed``.
+
+    Parameters
+    ----------
+    events
+        Name and data of each.
+    failed
+        Whether that is so of an attempt (:func:`labcrane.analysis.presentation_failed`); None where
+        nobody has looked, as while a session runs.
     """
-    labels = Labels(void_attempts(events))
+    labels = Labels(void_attempts(events), {each for each, so in (failed or {}).items() if so})
     return [labels.of(name, data) for name, data in events]
 
 
-def attempt_of(data: Mapping[str, Any]) -> Attempt:
+def attempt_of(data: Mapping[Any, Any]) -> Attempt:
     """Return of which trial an event is, and of which attempt at it."""
     return data.get("trial"), data.get("attempt")
 

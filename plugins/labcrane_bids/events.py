@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane.analysis import events_of, glass_of, movements_of
+from labcrane.analysis import PRESENTED, events_of, glass_of, movements_of, presentation_failed
 from labcrane.recording import (
     SessionRecord,
     attempt_of,
@@ -25,6 +25,7 @@ REPEAT = "repeat"
 said twice."""
 
 END = "trial.end"
+FAILED = "presentation_failed"
 
 MARK = "annotation"
 """What somebody marked afterwards: a row of that type, and a column of its text where there is
@@ -34,7 +35,7 @@ COLUMNS = ("trial", "attempt", "block", "practice", "counted", "outcome", "pair"
 """What of an event's data becomes a column of its own; of an event in a trial also what the trial's
 start says."""
 
-WHOLE = ("trial", "attempt", "block", "practice", "counted", "void", REPEAT)
+WHOLE = ("trial", "attempt", "block", "practice", "counted", "void", FAILED, REPEAT)
 """Columns of whole numbers; truth is 1."""
 
 
@@ -43,21 +44,23 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
 
     ``trial_type`` is the event's plain name and ``label`` says block and condition too. A trial's
     start lasts until its end, which is not known of one whose process died; everything else is a
-    moment. ``response_time`` is the reaction time: from the trial's start to the first stick beyond
-    its dead zone. What somebody marked afterwards is an ``annotation`` with its text.
+    moment. ``presentation_failed`` is n/a of what is in no row of the trial table, and where
+    nothing was to be shown. ``response_time`` is the reaction time: from the trial's start to the
+    first stick beyond its dead zone. What somebody marked afterwards is an ``annotation`` with its
+    text.
     """
     import pandas as pd
 
     zero = first_tick(session)
     events = events_of(session).sort_values("time", kind="stable")
     told = list(zip(events["name"].astype(str), events["data"], strict=True))
-    void = void_attempts(told)
+    void, failed = void_attempts(told), presentation_failed(session)
     ended = {attempt_of(data): _by_todays_rule(data) for name, data in told if name == END}
     rows_of = (movement.row for movement in movements_of(session))
     ended |= {attempt_of(row): row for row in rows_of}
     rows = []
     begun: dict[object, dict[str, Any]] = {}
-    for time, (name, data), label in zip(events["time"], told, labelled(told), strict=True):
+    for time, (name, data), label in zip(events["time"], told, labelled(told, failed), strict=True):
         row: Mapping[str, Any] = {}
         if name == "trial.start":
             begun[data["trial"]] = {key: data[key] for key in COLUMNS if key in data}
@@ -71,6 +74,7 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
                 "label": label,
                 "response_time": row.get("reaction_time"),
                 "void": attempt_of(about) in void if "attempt" in about else None,
+                FAILED: failed.get(attempt_of(about)),
             }
             | {column: about.get(column) for column in COLUMNS}
         )
@@ -143,6 +147,7 @@ def event_description(
         "practice": {"Description": "1 in a trial of practice"},
         "counted": {"Description": "1 in a trial that is a result; 0 on the way to one"},
         "void": {"Description": "1 in an attempt that was broken off, or made again later"},
+        FAILED: {"Description": PRESENTED[FAILED][1]},
         "outcome": {"Description": "how the trial ended"},
         "pair": {"Description": "pair of targets"},
         "direction": {"Description": "away from the machine's base, or towards it"},

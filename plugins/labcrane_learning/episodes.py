@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane import RecordingError
-from labcrane.analysis import Participant
-from labcrane.recording import SessionRecord, Stream
+from labcrane.analysis import Participant, presentation_failed
+from labcrane.recording import SessionRecord, Stream, attempt_of
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 ROUNDING_S = 1e-9
 SHORTEST = 2
@@ -40,9 +40,13 @@ class Episode:
     task
         What was to be done, in words.
     success
-        Whether it was.
+        Whether it was, by an operator who was shown enough of it.
+    presentation_failed
+        Whether the operator was shown less than the protocol asks for; that is no success, whatever
+        the outcome.
     skill
-        Fraction of the operator's attempts in this recording that succeeded.
+        Fraction of the operator's attempts in this recording that succeeded, of those of which
+        enough was shown.
     rate_hz
         Rows per second.
     observation, action
@@ -57,6 +61,7 @@ class Episode:
     attempt: int
     task: str
     success: bool
+    presentation_failed: bool
     skill: float
     rate_hz: float
     observation: Table
@@ -104,7 +109,13 @@ def episodes_of(
         A session has other columns than ``layout``.
     """
     sessions = list(participant.sessions())
-    ends = [str(end) for _, session in sessions for end in _outcomes(session.trials)]
+    failed = {number: presentation_failed(session) for number, session in sessions}
+    ends = [
+        str(row.get("outcome"))
+        for number, session in sessions
+        for row in session.trials.to_dict("records")
+        if not failed[number].get(attempt_of(row))
+    ]
     skill = ends.count("success") / len(ends) if ends else float("nan")
     for number, session in sessions:
         if layout_of(session) != layout:
@@ -122,13 +133,15 @@ def episodes_of(
                 _read(session, layout.observation, rows),
                 _read(session, layout.action, rows),
             )
+            unseen = failed[number].get(attempt_of(row), False)
             yield Episode(
                 participant=participant.name,
                 session=number,
                 trial=int(row["trial"]),
                 attempt=int(row.get("attempt", 1)),
                 task=_task(title, row),
-                success=str(row.get("outcome")) == "success",
+                success=str(row.get("outcome")) == "success" and not unseen,
+                presentation_failed=unseen,
                 skill=skill,
                 rate_hz=float(session.attrs["rate_hz"]) / every,
                 observation=seen[:-1:every],
@@ -142,10 +155,6 @@ def ticks_of(session: SessionRecord, every: int) -> npt.NDArray[np.int64]:
     found = [_rows(session, row) for row in session.trials.to_dict("records")]
     rows = [each[:-1:every] for each in found if len(each) >= SHORTEST]
     return np.unique(np.concatenate(rows)) if rows else np.empty(0, np.int64)
-
-
-def _outcomes(trials: "pd.DataFrame") -> list[object]:
-    return list(trials["outcome"]) if "outcome" in trials else []
 
 
 def _rows(session: SessionRecord, row: Mapping[Any, Any]) -> npt.NDArray[np.int64]:

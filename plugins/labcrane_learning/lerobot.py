@@ -106,6 +106,7 @@ class _Book:
             "trial": episode.trial,
             "attempt": episode.attempt,
             "success": episode.success,
+            "presentation_failed": episode.presentation_failed,
             "operator_skill": episode.skill,
         }
         for name, values in columns.items():

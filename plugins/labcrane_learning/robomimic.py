@@ -20,6 +20,11 @@ if TYPE_CHECKING:
     import h5py
 
 NAME = "demonstrations.hdf5"
+SAID = (
+    "participant", "session", "trial", "attempt", "task", "success", "presentation_failed", "skill",
+)  # fmt: skip
+"""What of an episode each demonstration says as attributes."""
+
 GYM = 2
 """Robomimic's number for environments of gymnasium."""
 
@@ -30,7 +35,8 @@ class Robomimic(Exporter):
     Pictures of the cameras that are asked for are ``obs/CAMERA_image``, of the modality ``rgb``.
 
     Beside what robomimic reads, each demonstration says whose it is, its task in words, whether it
-    succeeded and the operator's skill; ``mask/success`` lists those that succeeded, and names and
+    succeeded, whether the operator was shown too little (``presentation_failed``, which is no
+    success) and the operator's skill; ``mask/success`` lists those that succeeded, and names and
     units of columns are attributes.
     """
 
@@ -85,7 +91,7 @@ def _describe(
 def _write(demo: "h5py.Group", episode: Episode, layout: EpisodeLayout) -> None:
     count = len(episode.action)
     demo.attrs["num_samples"] = count
-    for name in ("participant", "session", "trial", "attempt", "task", "success", "skill"):
+    for name in SAID:
         demo.attrs[name] = getattr(episode, name)
     last = np.zeros(count, np.int64)
     last[-1] = 1

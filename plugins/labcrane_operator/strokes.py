@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from labcrane import FloatArray, RecordingError, open_recording
-from labcrane.analysis import movements_of
+from labcrane.analysis import movements_of, presentation_failed
+from labcrane.recording import attempt_of
 
 if TYPE_CHECKING:
     from labcrane.analysis import Movement
@@ -62,6 +63,8 @@ class Strokes:
 def read_strokes(path: Path, number: int) -> Strokes:
     """Read the main strokes of a session's counted movements; those without one are left out.
 
+    So are those in which the operator was shown too little.
+
     Raises
     ------
     RecordingError
@@ -90,7 +93,10 @@ def _check(session: "SessionRecord", where: str) -> None:
 
 
 def _strokes(session: "SessionRecord") -> Iterator[tuple[float, ...]]:
+    failed = presentation_failed(session)
     for movement in movements_of(session):
+        if failed.get(attempt_of(movement.row)):
+            continue  # the operator was shown too little of it
         stroke = main_stroke(movement)
         if stroke is not None:
             yield stroke

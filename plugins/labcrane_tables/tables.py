@@ -20,6 +20,7 @@ from labcrane.analysis import (
     events_of,
     fixations_of,
     measures_of,
+    presentation_failed,
     scores_of,
     with_unseen_areas,
 )
@@ -217,7 +218,9 @@ def _events(participant: Participant, number: int, session: SessionRecord) -> "p
         for name, data in zip(events["name"], events["data"], strict=True)
     ]
     said = list(zip(told["name"], told["data"], strict=True))
-    events.insert(list(events).index("name") + 1, "label", labelled(said))
+    events.insert(
+        list(events).index("name") + 1, "label", labelled(said, presentation_failed(session))
+    )
     events.insert(0, "participant", participant.name)
     events.insert(1, "session", number)
     return events

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane.analysis import Exporter, Participant, events_of
+from labcrane.analysis import Exporter, Participant, events_of, presentation_failed
 from labcrane.recording import (
     LABELS,
     Channel,
@@ -76,7 +76,7 @@ def write_session(writer: XdfWriter, session: SessionRecord) -> set[str]:
     ]
     for stream_name, channel, samples in (
         (NAMES, Channel("name", "none", "Name"), names),
-        (LABELS, Channel("label", "none", "Label"), labelled(told)),
+        (LABELS, Channel("label", "none", "Label"), labelled(told, presentation_failed(session))),
         (JSON, Channel("event", "none", "JSON"), texts),
     ):
         number = writer.add_stream(StreamHeader(stream_name, "Markers", (channel,), "string"))

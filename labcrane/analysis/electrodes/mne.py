@@ -7,6 +7,7 @@ import numpy as np
 
 from labcrane.analysis.electrodes.sampled import Sampled, sampled
 from labcrane.analysis.movements import events_of
+from labcrane.analysis.presented import presentation_failed
 from labcrane.errors import PluginError, RecordingError, nearest
 from labcrane.files.units import in_unit
 from labcrane.recording.labels import labelled, plain
@@ -154,7 +155,7 @@ def events_at(session: SessionRecord, signal: Sampled) -> tuple[Any, list[str]]:
     told = list(zip(events["name"].astype(str), events["data"], strict=True))
     positions = signal.at(events["time"].to_numpy(np.float64))
     inside = np.isfinite(positions)
-    labels = labelled(told)
+    labels = labelled(told, presentation_failed(session))
     return positions[inside], [label for label, there in zip(labels, inside, strict=True) if there]
 
 
