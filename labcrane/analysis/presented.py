@@ -4,7 +4,7 @@ A view says of each picture when it was shown (``labcrane.feedback.NAME``), and 
 view or sound had failed and was back. Lamp, sync report and results ask :class:`PresentedLimits`.
 """
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pydantic import PositiveFloat
@@ -88,7 +88,7 @@ PRESENTED: Mapping[str, tuple[str, str]] = {
     "feedback_lost": (
         "s",
         "how long a view of the operator, or a sound that was switched on, had failed and was not "
-        "back, pauses left out",
+        "back, also while the session was paused for it",
     ),
     "presentation_failed": (
         "1",
@@ -141,9 +141,11 @@ def presented(session: "SessionRecord") -> "pd.DataFrame | None":
     spans = [clock.at(trials[edge].to_numpy(float)) for edge in ("started", "ended")]
     table = pd.DataFrame(index=trials.index, columns=list(PRESENTED), dtype=float)
     on = [own & {*views, *names} for names in _switched_on(trials, own)]
-    table["feedback_lost"] = _lost(told, on, clock, *spans)
-    silent = _lost(told, [names - {*views} for names in on], clock, *spans)
-    limits = PresentedLimits.model_validate(session.context.get("presented", {}))
+    # In a pause the machine is held, so that less was shown is no harm to the movement; that it
+    # was interrupted is to be told.
+    table["feedback_lost"] = _lost(told, on, trials["started"], trials["ended"])
+    silent = _lost(told, [names - {*views} for names in on], spans[0], spans[1], clock)
+    limits = _limits(session)
     failed = np.array(silent) > limits.max_gap_s
     if views:
         shown = [_shown(session, name, clock, *spans) for name in views]
@@ -236,16 +238,22 @@ def _switched_on(trials: "pd.DataFrame", sounds: set[str]) -> list[set[str]]:
 def _lost(
     told: "pd.DataFrame",
     names: Sequence[set[str]],
-    clock: _Clock,
-    since: "FloatArray",
-    until: "FloatArray",
+    since: Iterable[float],
+    until: Iterable[float],
+    clock: _Clock | None = None,
 ) -> list[float]:
-    """Return for how long one of what is named for each movement had failed, in seconds."""
-    outages = {frozenset(own): [clock.at(edges) for edges in _outages(told, own)] for own in names}
+    """Return for how long one of what is named for each movement had failed, in seconds.
+
+    With a ``clock``, whose times ``since`` and ``until`` then are, pauses are left out.
+    """
+    outages = {
+        frozenset(own): [clock.at(edges) if clock else edges for edges in _outages(told, own)]
+        for own in names
+    }
     return [
         sum(
             (
-                max(0.0, min(end, over) - max(start, began))
+                max(0.0, float(min(end, over) - max(start, began)))
                 for began, over in outages[frozenset(own)]
             ),
             0.0,
@@ -313,11 +321,9 @@ def judge_presented(session: "SessionRecord") -> tuple[Finding, ...]:
     if table is None or not (failed := not_presented(table)).any():
         return ()
     rows = session.trials[["trial"]].join(table)[failed].to_dict("records")
-    said = [f"trial {row['trial']:g}: {in_words(row)}" for row in rows[:NAMED]]
-    more = f"; and {len(rows) - NAMED} more" if len(rows) > NAMED else ""
     text = (
         f"in {len(rows)} of {len(table)} movements the operator saw or heard too little; "
-        f"averages leave them out ({'; '.join(said)}{more})"
+        f"averages leave them out ({_named(rows)})"
     )
     advice = "close other programs, look at the graphics driver, or choose a lower quality"
     if any(row["feedback_lost"] for row in rows):
@@ -325,3 +331,32 @@ def judge_presented(session: "SessionRecord") -> tuple[Finding, ...]:
     return (
         Finding(Verdict.FAIL if len(rows) > FAILED * len(table) else Verdict.WARN, text, advice),
     )
+
+
+def judge_interrupted(session: "SessionRecord") -> tuple[Finding, ...]:
+    """Return what is to be said of movements that count though feedback had failed in them.
+
+    The session was paused for it and the machine was held, so that nothing moved unseen.
+    """
+    table = presented(session)
+    if table is None:
+        return ()
+    lost = (table["feedback_lost"] > _limits(session).max_gap_s) & ~not_presented(table)
+    rows = session.trials[["trial"]].join(table)[lost].to_dict("records")
+    if not rows:
+        return ()
+    text = (
+        f"in {len(rows)} of {len(table)} movements a view or sound had failed while the session "
+        f"was paused; they count ({_named(rows)})"
+    )
+    advice = "leave them out where an interruption matters: feedback_lost in the tables"
+    return (Finding(Verdict.WARN, text, advice),)
+
+
+def _limits(session: "SessionRecord") -> PresentedLimits:
+    return PresentedLimits.model_validate(session.context.get("presented", {}))
+
+
+def _named(rows: Sequence[Mapping[Hashable, Any]]) -> str:
+    said = [f"trial {row['trial']:g}: {in_words(row)}" for row in rows[:NAMED]]
+    return "; ".join([*said, *([f"and {len(rows) - NAMED} more"] if len(rows) > NAMED else [])])

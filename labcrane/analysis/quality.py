@@ -18,7 +18,7 @@ SHOWN = 5
 
 def verdict_of_stamps(report: Mapping[str, Any]) -> str:
     """Return what a recorded sync report says of time stamps alone; nothing where there is none."""
-    if "presented" not in report:
+    if not {"presented", "interrupted"} & set(report):
         return str(report.get("verdict", ""))
     judged = [*report["streams"], *filter(None, [report["loop"]]), *report["missing"]]
     return worst(Verdict(one["verdict"]) for one in judged).value

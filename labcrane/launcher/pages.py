@@ -119,6 +119,8 @@ def _verdict(
         return "bad", f"The session died{where}; what it recorded until then is saved", again
     level = LEVELS[report.verdict.value if report else "PASS"]
     doubt = "; the operator saw or heard too little" if report and report.presented else ""
+    if report and report.interrupted:
+        doubt += "; it was paused for a view or sound that had failed"
     if report and LEVELS[report.of_stamps.value] != "ok":
         doubt += "; look at its time stamps"
     if outcome.owed:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane.analysis.presented import judge_presented
+from labcrane.analysis.presented import judge_interrupted, judge_presented
 from labcrane.errors import LabcraneError
 from labcrane.protocol.streams import StreamNeed, TimeLimits
 from labcrane.recording.foreign_streams import RecordedStream
@@ -75,8 +75,8 @@ def conclude(group: "h5py.Group", spaces: Mapping[str, str] = NO_SPACES) -> Sync
     absent = tuple(missing) if group.attrs.get("fast") == "yes" else ()
     never = () if absent else never_came(missing)
     with session_in(group) as session:
-        presented = judge_presented(session)
-    report = SyncReport(tuple(judged), _loop(group, context, limits), never, absent, presented)
+        shown = judge_presented(session), judge_interrupted(session)
+    report = SyncReport(tuple(judged), _loop(group, context, limits), never, absent, *shown)
     write_sync_report(group, report.as_json())
     return report
 

@@ -272,6 +272,49 @@ def test_time_without_a_view_counts_from_its_failure_until_it_shows_again(tmp_pa
     assert set(lost.iloc[1:]) == {0.0}
 
 
+def _paused_for_a_view(folder: Path, dark_s: float) -> SessionRecord:
+    """Return a session that was paused for 2.5 s in its first movement, its view having failed.
+
+    The view was dark for so long before that was known.
+    """
+    text = VIEWED + "on_fault: {feedback_lost: pause}\n"
+    orders = {800: [FeedbackLost("cab", "it died")], 1100: [FeedbackReady("cab", "renderer x")]}
+    lost, back = 100.0 + 800 / RATE_HZ, 100.0 + 1100 / RATE_HZ
+    whole = np.arange(90.0, 400.0, 1 / 60)
+    shown = whole[(whole < lost - dark_s) | (whole >= back - 0.01)]
+    return recorded(folder, {"cab": shown}, orders, text)
+
+
+@pytest.mark.slow
+def test_a_view_that_failed_is_lost_in_a_pause_too_and_the_report_says_so(tmp_path: Path) -> None:
+    session = _paused_for_a_view(tmp_path, 0.1)
+    table = measure_session(session).assign(participant="P001", session=1)
+    first = table.iloc[0]
+    assert first["paused"] == pytest.approx(2.5, abs=0.02)
+    assert first["feedback_lost"] == pytest.approx(2.5, abs=0.02)
+    assert set(table["feedback_lost"].iloc[1:]) == {0.0}
+    assert first["longest_without_picture"] == pytest.approx(0.1, abs=0.03)
+    assert not not_presented(table).any(), "the machine was held while nothing was seen"
+    (finding,) = session.sync_report["interrupted"]
+    assert finding["verdict"] == session.sync_report["verdict"] == "WARN"
+    assert finding["text"].startswith(f"in 1 of {len(table)} movements a view or sound had failed")
+    assert f"feedback lost for {first['feedback_lost']:.2f} s" in finding["text"]
+    told = {"verdict": "WARN", "streams": [], "loop": None, "missing": [], "interrupted": [finding]}
+    assert verdict_of_stamps(told) == "PASS"
+
+
+@pytest.mark.slow
+def test_a_view_that_was_dark_before_the_pause_for_it_leaves_out_the_movement(
+    tmp_path: Path,
+) -> None:
+    session = _paused_for_a_view(tmp_path, 0.4)
+    table = measure_session(session)
+    assert not_presented(table).tolist() == [number == 0 for number in range(len(table))]
+    assert table["longest_without_picture"].iloc[0] == pytest.approx(0.4, abs=0.03)
+    assert "interrupted" not in session.sync_report
+    assert "feedback lost for 2.5" in session.sync_report["presented"][0]["text"]
+
+
 @pytest.mark.slow
 def test_a_view_that_never_showed_a_picture_has_shown_none_of_any_movement(tmp_path: Path) -> None:
     session = recorded(tmp_path, {}, {5: [FeedbackLost("cab", "no driver")]})

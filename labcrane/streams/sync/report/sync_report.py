@@ -58,6 +58,8 @@ class SyncReport:
         Streams that are not there in a rehearsal, by label: nothing of them can have failed.
     presented
         What is to be said of movements of which the operator was shown too little.
+    interrupted
+        What is to be said of movements that were paused since a view or sound had failed.
     """
 
     streams: tuple[StreamReport, ...]
@@ -65,11 +67,16 @@ class SyncReport:
     missing: tuple[Finding, ...] = field(default_factory=tuple)
     absent: tuple[str, ...] = ()
     presented: tuple[Finding, ...] = ()
+    interrupted: tuple[Finding, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
         """The worst of all."""
-        return worst([self.of_stamps, *(one.verdict for one in self.presented)])
+        return worst([self.of_stamps, *(one.verdict for one in self._of_feedback)])
+
+    @property
+    def _of_feedback(self) -> tuple[Finding, ...]:
+        return (*self.presented, *self.interrupted)
 
     @property
     def of_stamps(self) -> Verdict:
@@ -82,7 +89,7 @@ class SyncReport:
     def as_json(self) -> dict[str, Any]:
         """Return what JSON can hold; what is not known is null."""
         plain = {name: finite(each) for name, each in asdict(self).items()}
-        for name in ("absent", "presented"):
+        for name in ("absent", "presented", "interrupted"):
             if not plain[name]:  # as in recordings of before
                 del plain[name]
         return {"verdict": self.verdict.value, **plain}
@@ -97,7 +104,7 @@ class SyncReport:
         found += [(f"{one.name}: ", finding) for one in self.streams for finding in one.findings]
         if self.loop is not None:
             found += [("loop: ", finding) for finding in self.loop.findings]
-        found += [("feedback: ", finding) for finding in self.presented]
+        found += [("feedback: ", finding) for finding in self._of_feedback]
         order = list(Verdict)
         found.sort(key=lambda pair: -order.index(pair[1].verdict))
         return [f"{f.verdict} {whose}{f.text}; {f.advice}" for whose, f in found]
