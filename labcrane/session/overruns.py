@@ -55,10 +55,15 @@ class OverrunReporter:
 
     def _why(self, place: str, overrun: Overrun) -> str:
         took, tick = 1000 * overrun.worst_s, 1000 * self._period
-        said = f"{place}, took up to {took:.0f} ms, and a tick has {tick:.1f} ms"
-        if overrun.computed_s >= self._period:
-            return said
+        computed = overrun.calls - overrun.waited
+        # The longest call alone would excuse a component that computes for too long in all others.
+        found = [f"{computed} computed for too long"] if computed else []
+        if overrun.waited:
+            found.append(
+                f"{overrun.waited} waited for a device, or for the processor that other programs "
+                "had"
+            )
         return (
-            f"{said}; it computed for {1000 * overrun.computed_s:.1f} ms at most, and waited for a "
-            "device, or for the processor that other programs had"
+            f"{place}, took up to {took:.0f} ms, and a tick has {tick:.1f} ms; of {overrun.calls} "
+            f"such calls {' and '.join(found)}"
         )

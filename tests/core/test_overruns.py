@@ -85,25 +85,37 @@ def test_outside_of_a_session_in_real_time_no_tick_asks_the_kernel(
     CallMonitor().begin_tick(1)
 
 
+WAITED = "waited for a device, or for the processor that other programs had"
+
+
 @pytest.mark.parametrize(
-    ("computed_s", "said"),
+    ("waited", "said"),
     [
-        (0.0004, "; it computed for 0.4 ms at most, and waited for a device, or for the processor "
-                 "that other programs had"),
-        (0.05, ""),
+        (10, f"10 {WAITED}"),
+        (1, f"9 computed for too long and 1 {WAITED}"),
+        (0, "10 computed for too long"),
     ],
-)  # fmt: skip
-def test_the_record_says_whether_a_slow_call_waited(computed_s: float, said: str) -> None:
+)
+def test_the_record_says_how_many_slow_calls_computed_and_how_many_waited(
+    waited: int, said: str
+) -> None:
     class Log:
         def append(self, event: Event, tick: int) -> None:
             """Nothing to do."""
 
     monitor, console = CallMonitor(), ScriptedConsole()
     reporter = OverrunReporter(monitor, 240.0, Log(), console)
-    monitor.overruns["scheme 'x'"] = Overrun(5, 4, 0.05, computed_s)
+    monitor.overruns["scheme 'x'"] = Overrun()
+    for number in range(10):
+        took, computed = (0.02, 0.0004) if number < waited else (0.012, 0.0119)
+        monitor.overruns["scheme 'x'"].add(took, computed, PERIOD_S)
     nothing = np.zeros(1)
     reporter(Frame(Tick(7, 1.0, 1.0), 0.0, nothing, nothing, nothing, nothing))
     (event,) = console.told
-    assert event.data["why"] == f"scheme 'x', took up to 50 ms, and a tick has 4.2 ms{said}"
-    assert (event.data["calls"], event.data["waited"]) == (5, 4)
-    assert (event.data["worst_s"], event.data["computed_s"]) == (0.05, computed_s)
+    worst_s, computed_s = (0.02, 0.0004) if waited else (0.012, 0.0119)
+    assert event.data["why"] == (
+        f"scheme 'x', took up to {1000 * worst_s:.0f} ms, and a tick has 4.2 ms; "
+        f"of 10 such calls {said}"
+    )
+    assert (event.data["calls"], event.data["waited"]) == (10, waited)
+    assert (event.data["worst_s"], event.data["computed_s"]) == (worst_s, computed_s)
