@@ -251,6 +251,13 @@ def _hollow(number: int, session: SessionRecord) -> str | None:
     return None
 
 
+def kinds_of(participants: Iterable[Participant]) -> str:
+    """Return ``SIMULATED and PILOT``, as far as there are any; nothing where all are people's."""
+    found = {participant.status for participant in participants}
+    named = [str(kind).upper() for kind in (Status.SIMULATED, Status.PILOT) if kind in found]
+    return " and ".join(named)
+
+
 def _judge(recording: Recording) -> tuple[Status, str]:
     sessions = [recording.session(number) for number in recording.sessions]
     for status, word in ((Status.SIMULATED, "simulated"), (Status.PILOT, "pilot")):

@@ -3,6 +3,7 @@
 import csv
 import math
 import os
+import re
 import subprocess
 from collections.abc import Sequence
 from dataclasses import replace
@@ -413,6 +414,32 @@ def runs(percents: list[tuple[float, int]]) -> list[OperatorTest]:
         made = indicate(done, 60.0, LITERAL)
         tests.append(OperatorTest("R001", 1, number, "doors", done, 60.0, "", made, LITERAL))
     return tests
+
+
+def test_each_sheet_says_first_that_its_operators_are_simulated_and_its_formulas_still_hold(
+    tmp_path: Path,
+) -> None:
+    from openpyxl import load_workbook
+
+    tests = runs([(60.0, 0), (70.0, 2)])
+    books = []
+    for number, kinds in enumerate(("", "SIMULATED and PILOT")):
+        write_workbook(tests, tmp_path / f"{number}.xlsx", kinds)
+        books.append(load_workbook(tmp_path / f"{number}.xlsx"))
+    for plain, stamped in zip(*books, strict=True):
+        first, head, *rows = stamped.iter_rows(values_only=True)
+        assert first[0] == "SIMULATED and PILOT"
+        assert set(first[1:]) <= {None}
+        assert stamped.freeze_panes == "A3"
+        expected_head, *expected = plain.iter_rows(values_only=True)
+        assert head == expected_head
+        for number, (row, as_plain) in enumerate(zip(rows, expected, strict=True), start=3):
+            for cell, other in zip(row, as_plain, strict=True):
+                if isinstance(other, str) and other.startswith("="):
+                    moved = re.sub(rf"(?<=[A-Z]){number - 1}\b", str(number), other)
+                    assert cell == moved.replace("B$1", "B$2").replace("C$1", "C$2")
+                else:
+                    assert cell == other
 
 
 def test_reports_of_deformities_are_in_the_workbook_as_hits_misses_and_false_alarms(

@@ -117,7 +117,9 @@ def test_the_study_can_be_scored(data: Path, session, tmp_path: Path) -> None:
     workbook = tmp_path / "evaluation.xlsx"
     said = labcrane_command("score", str(data), "--out", str(workbook), "--include", "simulated")
     assert all(name in said for name in SCENES)
-    head, *rows = load_workbook(workbook)["Tests"].iter_rows(values_only=True)
+    book = load_workbook(workbook)
+    assert {sheet["A1"].value for sheet in book} == {"SIMULATED"}
+    _, head, *rows = book["Tests"].iter_rows(values_only=True)
     tests = [dict(zip(head, row, strict=True)) for row in rows]
     trials = session.trials
     trials = trials[trials["practice"] == 0]

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from labcrane.analysis.cohort import Cohort, Participant, Status
+from labcrane.analysis.cohort import Cohort, Participant, Status, kinds_of
 from labcrane.analysis.gaze import fixations_of, gaze_units, with_unseen_areas
 from labcrane.analysis.gaze_streams import unmeasured_of
 from labcrane.analysis.measures import DEFAULTS, MeasureSettings, measures_of
@@ -103,7 +103,7 @@ def write_report(
     columns = zip(*in_order, strict=True)
     movements, loops, syncs, answers, scores, thresholds, drifts, without = columns
     everything = with_unseen_areas(pd.concat(movements, ignore_index=True))
-    kinds = _kinds(cohort.included)
+    kinds = kinds_of(cohort.included)
     page = Page(_title(cohort.included), folder / "report.html", folder, footer=kinds)
     _stamp(page, [participant.status for participant in cohort.included])
     page.links({p.name: f"participants/{p.name}.html" for p in cohort.included})
@@ -187,15 +187,8 @@ def _primary(cohort: Cohort) -> list[str]:
 def _title(participants: Sequence[Participant]) -> str:
     """Return the study's title, behind what kind of participants it is about."""
     title = str(participants[0].context.get("title", "labcrane"))
-    kinds = _kinds(participants)
+    kinds = kinds_of(participants)
     return f"{kinds}: {title}" if kinds else title
-
-
-def _kinds(participants: Sequence[Participant]) -> str:
-    """Return ``SIMULATED and PILOT``, as far as there are any; nothing where all are people's."""
-    found = {participant.status for participant in participants}
-    named = [str(kind).upper() for kind in (Status.SIMULATED, Status.PILOT) if kind in found]
-    return " and ".join(named)
 
 
 def _stamp(page: Page, statuses: list[Status]) -> None:
@@ -590,7 +583,11 @@ def _participant_page(
 ) -> None:
     path = folder / "participants" / f"{participant.name}.html"
     page = Page(
-        participant.name, path, folder, prefix=f"{participant.name}_", footer=_kinds([participant])
+        participant.name,
+        path,
+        folder,
+        prefix=f"{participant.name}_",
+        footer=kinds_of([participant]),
     )
     page.links({"study": "../report.html"})
     _stamp(page, [participant.status])

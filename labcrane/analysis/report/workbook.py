@@ -56,8 +56,12 @@ WIDTH = 14
 NO_RATING = "no rating"
 
 
-def write_workbook(tests: Sequence[OperatorTest], path: Path) -> None:
-    """Write the workbook of ``tests``, which are in order of operator and time."""
+def write_workbook(tests: Sequence[OperatorTest], path: Path, kinds: str = "") -> None:
+    """Write the workbook of ``tests``, which are in order of operator and time.
+
+    ``kinds`` is the first line of each sheet: ``SIMULATED``, ``PILOT``; nothing where all are
+    people's. Sheets are copied and printed one by one.
+    """
     from openpyxl import Workbook
 
     book = Workbook()
@@ -65,16 +69,24 @@ def write_workbook(tests: Sequence[OperatorTest], path: Path) -> None:
     if summary is None:
         raise AssertionError("a new workbook has a sheet")
     summary.title = "Summary"
-    _fill(summary, SUMMARY, _operators(tests))
-    _fill(book.create_sheet("Tests"), HEAD, map(_row, tests, range(2, len(tests) + 2)))
-    _trend(book, tests)
-    _fill(book.create_sheet("Deformities"), ("operator", *KINDS), _detections(tests))
-    _fill(
-        book.create_sheet("Advice"),
-        ("operator", "about", "verdict", "evidence"),
-        ((a.operator, a.about, a.verdict, a.evidence) for a in advice(tests)),
-    )
-    _fill(book.create_sheet("Settings"), ("operator", "session", "setting", "value"), _used(tests))
+    first = _begin(summary, SUMMARY, kinds)
+    _fill(summary, _operators(tests, first))
+    sheet = book.create_sheet("Tests")
+    first = _begin(sheet, HEAD, kinds)
+    _fill(sheet, map(_row, tests, range(first, first + len(tests))))
+    _trend(book, tests, kinds)
+    for title, head, rows in (
+        ("Deformities", ("operator", *KINDS), _detections(tests)),
+        (
+            "Advice",
+            ("operator", "about", "verdict", "evidence"),
+            ((a.operator, a.about, a.verdict, a.evidence) for a in advice(tests)),
+        ),
+        ("Settings", ("operator", "session", "setting", "value"), _used(tests)),
+    ):
+        sheet = book.create_sheet(title)
+        _begin(sheet, head, kinds)
+        _fill(sheet, rows)
     book.save(path)
 
 
@@ -137,9 +149,9 @@ def _row(test: OperatorTest, number: int) -> tuple[Cell, ...]:
     )
 
 
-def _operators(tests: Sequence[OperatorTest]) -> Iterator[tuple[Cell, ...]]:
+def _operators(tests: Sequence[OperatorTest], first: int) -> Iterator[tuple[Cell, ...]]:
     names = dict.fromkeys(test.operator for test in tests)
-    for row, operator in enumerate(names, start=2):
+    for row, operator in enumerate(names, start=first):
         own = [test for test in tests if test.operator == operator]
         yield (
             operator,
@@ -152,12 +164,14 @@ def _operators(tests: Sequence[OperatorTest]) -> Iterator[tuple[Cell, ...]]:
         )
 
 
-def _trend(book: "Workbook", tests: Sequence[OperatorTest]) -> None:
+def _trend(book: "Workbook", tests: Sequence[OperatorTest], kinds: str) -> None:
     from openpyxl.chart import LineChart, Reference
 
     sheet = book.create_sheet("Trend")
     operators = list(dict.fromkeys(test.operator for test in tests))
     sessions = sorted({test.session for test in tests})
+    head = ("session", *operators, *(f"{name} (formula)" for name in operators))
+    first = _begin(sheet, head, kinds)
     percents: dict[tuple[str, int], list[float]] = {}
     for test in tests:
         percents.setdefault((test.operator, test.session), []).append(test.indicator.percent)
@@ -167,9 +181,9 @@ def _trend(book: "Workbook", tests: Sequence[OperatorTest]) -> None:
         return None if own is None else _number(fmean(own))
 
     def formula(operator: str, column: int, row: int) -> Cell:
-        if (operator, sessions[row - 2]) not in percents:
+        if (operator, sessions[row - first]) not in percents:
             return None
-        name = f"{_letters(column)}$1"
+        name = f"{_letters(column)}${first - 1}"
         by = f"{_column('operator')},{name},{_column('session')},$A{row}"
         return f"=AVERAGEIFS({_column('percent (formula)')},{by})"
 
@@ -179,18 +193,18 @@ def _trend(book: "Workbook", tests: Sequence[OperatorTest]) -> None:
             *(mean(name, session) for name in operators),
             *(formula(name, at, row) for at, name in enumerate(operators, start=2)),
         )
-        for row, session in enumerate(sessions, start=2)
+        for row, session in enumerate(sessions, start=first)
     )
-    _fill(sheet, ("session", *operators, *(f"{name} (formula)" for name in operators)), rows)
+    _fill(sheet, rows)
     chart = LineChart()
     chart.title, chart.y_axis.title, chart.x_axis.title = "Indicator", "percent", "session"
     chart.x_axis.delete = chart.y_axis.delete = False
-    last = len(sessions) + 1
+    last = first + len(sessions) - 1
     chart.add_data(
-        Reference(sheet, min_col=2, max_col=len(operators) + 1, min_row=1, max_row=last),
+        Reference(sheet, min_col=2, max_col=len(operators) + 1, min_row=first - 1, max_row=last),
         titles_from_data=True,
     )
-    chart.set_categories(Reference(sheet, min_col=1, min_row=2, max_row=last))
+    chart.set_categories(Reference(sheet, min_col=1, min_row=first, max_row=last))
     sheet.add_chart(chart, f"{_letters(2 * len(operators) + 3)}2")
 
 
@@ -212,17 +226,25 @@ def _used(tests: Sequence[OperatorTest]) -> Iterator[tuple[Cell, ...]]:
             yield test.operator, test.session, name, value
 
 
-def _fill(sheet: "Worksheet", head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> None:
+def _begin(sheet: "Worksheet", head: Sequence[str], kinds: str) -> int:
+    """Write what stands above a sheet's rows; return the number of its first row."""
     from openpyxl.styles import Font
 
-    sheet.append(list(head))
-    for cell in sheet[1]:
-        cell.font = Font(bold=True)
-    for row in rows:
-        sheet.append([_safe(value) for value in row])
-    sheet.freeze_panes = "A2"
+    above = [[kinds], list(head)] if kinds else [list(head)]
+    for line in above:
+        sheet.append(line)
+        for cell in sheet[sheet.max_row]:
+            cell.font = Font(bold=True)
+    first = len(above) + 1
+    sheet.freeze_panes = f"A{first}"
     for column in range(1, len(head) + 1):
         sheet.column_dimensions[_letters(column)].width = WIDTH
+    return first
+
+
+def _fill(sheet: "Worksheet", rows: Iterable[Sequence[Cell]]) -> None:
+    for row in rows:
+        sheet.append([_safe(value) for value in row])
 
 
 def _safe(value: Cell) -> Cell:

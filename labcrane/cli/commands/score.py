@@ -32,6 +32,7 @@ def score(
     """Write the evaluation workbook: performance indicator, trend, what to practise next."""
     from rich.table import Table
 
+    from labcrane.analysis.cohort import kinds_of
     from labcrane.analysis.report.workbook import advice, write_csv, write_workbook
     from labcrane.analysis.scoring.operator_tests import operator_tests
     from labcrane.participants.products import product
@@ -53,7 +54,7 @@ def score(
     tests = operator_tests(cohort, _settings(settings) if settings else None, leave_out)
     names = [person.name for person in cohort.included]
     with product(folder, "score", path.resolve().parent, names, today(), whole=True) as made:
-        write_workbook(tests, made.folder / path.name)
+        write_workbook(tests, made.folder / path.name, kinds_of(cohort.included))
         write_csv(tests, made.folder / path.with_suffix(".csv").name)
     table = Table("operator", "session", "trial", "scenario", "raw", "percent")
     for test in tests:
