@@ -139,6 +139,51 @@ def test_what_comes_with_each_block_in_everybody_is_named_beside_its_change() ->
     assert rows.loc["block", "confounded"] == said
 
 
+def asked_after(movements: pd.DataFrame, seed: int) -> pd.DataFrame:
+    """Return a load of 10 more under ``tone``, asked after each block and once more at the end."""
+    dice = np.random.default_rng(seed)
+    blocks = movements.drop_duplicates(["participant", "block"])
+    rows = [
+        {"participant": row["participant"], "session": 1, "block": row["block"],
+         "step": 2.0 * row["block"], "questionnaire": "tlx", "score": "raw",
+         "value": dice.normal(40.0, 5.0) + 10.0 * (row["condition"] == "tone")}
+        for row in blocks.to_dict("records")
+    ]  # fmt: skip
+    last = [{**row, "step": 5.0, "value": 0.0} for row in rows if row["block"] == 2]
+    return pd.DataFrame([*rows, *last])
+
+
+def test_a_score_is_tested_over_conditions_as_a_paired_test_does() -> None:
+    movements = crossover(3, 13, ("plain", "tone"))
+    people = dict.fromkeys(sorted(set(movements["participant"])), "")
+    scores = outcomes.with_conditions(asked_after(movements, 4), movements)
+    scores = scores[(scores["participant"] != "P003") | (scores["condition"] == "plain")]
+    tests = outcomes.score_tests(scores, people).set_index("factor")
+    first = scores[scores["step"] < 5.0]
+    means = first.pivot_table(values="value", index="participant", columns="condition").dropna()
+    theirs = ttest_rel(means["plain"], means["tone"])
+    row = tests.loc["condition"]
+    assert (row["f"], row["p"]) == pytest.approx((theirs.statistic**2, theirs.pvalue))
+    assert (row["n"], row["left_out"], row["confounded"]) == (12, "P003", "")
+    table = outcomes.condition_scores(scores, people).set_index("condition")
+    assert set(table["n"]) == {12}
+    np.testing.assert_allclose(table["mean"], means.mean())
+    alike = crossover(3, 13, ("plain", "tone"), balanced=False)
+    scores = outcomes.with_conditions(asked_after(alike, 4), alike)
+    tests = outcomes.score_tests(scores, people).set_index("factor")["confounded"]
+    said = "the order in which conditions came"
+    assert (tests["condition"], tests["occasion"]) == (said, "conditions")
+
+
+def test_a_score_that_was_asked_once_at_the_end_is_not_tested_over_conditions() -> None:
+    movements = crossover(3, 12, ("plain", "tone"))
+    people = dict.fromkeys(sorted(set(movements["participant"])), "")
+    scores = outcomes.with_conditions(asked_after(movements, 4), movements)
+    scores = scores[scores["step"] == 5.0]
+    assert outcomes.score_tests(scores, people).empty
+    assert outcomes.condition_scores(scores, people).empty
+
+
 @pytest.mark.parametrize("people", range(4, 13))
 def test_orders_that_were_not_had_equally_often_are_told_with_their_numbers(people: int) -> None:
     names = ("a", "b", "c")

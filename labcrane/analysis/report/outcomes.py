@@ -397,17 +397,76 @@ def score_table(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame
 
 
 def score_tests(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
-    """Return the tests of every score over occasions and groups."""
-    own = occasions(scores, groups)
+    """Return the tests of every score over occasions, conditions and groups."""
     between = [GROUP] if len({name for name in groups.values() if name}) > 1 else []
-    tests = [
-        test
-        for outcome, part in own.groupby("outcome")
-        for test in analyse(
-            part.rename(columns={"value": str(outcome)}), str(outcome), ["occasion"], between
-        )
-    ]
+    tests: list[Anova] = []
+    for outcome, part in occasions(scores, groups).groupby("outcome"):
+        name = str(outcome)
+        table = part.rename(columns={"value": name})
+        for test in analyse(table, name, ["occasion"], between):
+            confounded = _of_occasions(table, test, "occasion", CONDITION, "conditions")
+            tests.append(replace(test, confounded=confounded))
+        behind = after_conditions(table)
+        for test in analyse(behind, name, [CONDITION], between):
+            if CONDITION in test.factor.split(":"):
+                order, _ = ORDER[0]
+                confounded = _of_occasions(behind, test, CONDITION, "occasion", order)
+                tests.append(replace(test, confounded=confounded))
     return _frame(tests, groups)
+
+
+def _of_occasions(table: "pd.DataFrame", test: Anova, factor: str, other: str, words: str) -> str:
+    """Return what a score's factor cannot be told from in those who are in its test."""
+    if test.factor != factor or other not in table or (table[other] == "").all():
+        return ""
+    known = table.dropna(subset=[test.measure])
+    known = known[known["participant"].isin(test.people)]
+    return "" if told_apart(known, [factor], [["participant"], [other]]) else words
+
+
+def with_conditions(scores: "pd.DataFrame", movements: "pd.DataFrame") -> "pd.DataFrame":
+    """Return scores with the condition of the block that each was asked after; "" for none.
+
+    Parameters
+    ----------
+    movements
+        Of the same people, with ``condition`` where they had several.
+    """
+    where = ["participant", "session", "block"]
+    if CONDITION not in movements or not len(scores):
+        return scores.assign(condition="")
+    blocks = movements.drop_duplicates(where).set_index(where)[CONDITION].fillna("")
+    keys = zip(*(scores[name] for name in where), strict=True)
+    return scores.assign(condition=[blocks.get(key, "") for key in keys])
+
+
+def after_conditions(scores: "pd.DataFrame") -> "pd.DataFrame":
+    """Return the scores of questionnaires that were asked after blocks of conditions.
+
+    Of one that was asked several times after a block, the first counts: the last may be about the
+    whole session.
+    """
+    if CONDITION not in scores:
+        return scores.iloc[:0].assign(condition="")
+    own = scores[scores[CONDITION] != ""]
+    first = own.groupby(["participant", "session", "block", "outcome"])["step"].transform("min")
+    return own[own["step"] == first]
+
+
+def condition_scores(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
+    """Return means and spreads of every score by group and condition; empty where there are none.
+
+    Of those who have a value in every condition, who are tested.
+    """
+    own = after_conditions(occasions(scores, groups)).dropna(subset=["value"])
+    each = own.groupby(["outcome", GROUP, CONDITION, "participant"])["value"].mean()
+    had = each.groupby(level=["outcome", "participant"]).transform("size")
+    planned = own.groupby("outcome")[CONDITION].nunique()
+    there = planned.loc[each.index.get_level_values("outcome")].to_numpy()
+    whole = each[(had.to_numpy() == there) & (there > 1)]
+    cells = whole.groupby(level=["outcome", GROUP, CONDITION])
+    table: pd.DataFrame = cells.agg(["count", "mean", "std"])
+    return table.rename(columns={"count": "n", "std": "sd"}).reset_index()
 
 
 def occasions(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":

@@ -266,10 +266,14 @@ def _study(
         page, everything, results, factors, primary
     )
     looked = _gaze(page, results, factors)
+    scores = outcomes.with_conditions(scores, everything)
     tests = outcomes.score_tests(scores, groups)
     if len(scores):
         page.heading("Questionnaires")
         page.table("scores", outcomes.score_table(scores, groups))
+        if len(by_condition := outcomes.condition_scores(scores, groups)):
+            page.say("By condition, of those who answered after each of them:")
+            page.table("scores_by_condition", by_condition)
         page.table("score_tests", tests)
     made = Made(anovas, trends, scales, practice, looked, tests)
     short = shortfalls(everything, scores, made, factors, primary)

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.presented import not_presented
 from labcrane.analysis.quality import is_done, is_result
-from labcrane.analysis.report.factors import DISTANCE, GROUP, PHASE, PLACE, Factors
+from labcrane.analysis.report.factors import CONDITION, DISTANCE, GROUP, PHASE, PLACE, Factors
 from labcrane.analysis.report.outcomes import (
     ADJUSTED,
     SEQUENCE,
     Plan,
+    after_conditions,
     measures_in,
     named_factor,
     occasions,
@@ -146,6 +147,13 @@ def _of_scores(
         design = _Design(table, table, str(outcome), ("occasion",), levels, people, {})
         for name in levels:
             yield from design.lacking((name,), name, tested=name in made)
+        behind = after_conditions(table)
+        conditions = tuple(sorted(behind[CONDITION].unique()))
+        each = behind.groupby("participant")[CONDITION].nunique()
+        if len(conditions) > 1 and each.max() > 1:  # else it was asked after one of them
+            own_levels = {CONDITION: conditions}
+            design = _Design(behind, behind, str(outcome), (CONDITION,), own_levels, people, {})
+            yield from design.lacking((CONDITION,), CONDITION, tested=CONDITION in made)
 
 
 def _made(tests: "pd.DataFrame", measure: str) -> set[str]:
