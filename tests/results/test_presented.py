@@ -24,11 +24,15 @@ from labcrane.analysis.quality import exclusions, is_result, verdict_of_stamps
 from labcrane.analysis.report.answer import _exclusions
 from labcrane.analysis.report.outcomes import practised
 from labcrane.analysis.statistics.time_outs import time_outs
-from labcrane.core.findings import Verdict, worst
+from labcrane.core.findings import Finding, Verdict, worst
+from labcrane.launcher.launcher import Outcome
+from labcrane.launcher.pages import left_behind
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Message, Order
+from labcrane.session.visit import visit_of
 from labcrane.streams.feedback_log import log_name
 from labcrane.streams.recorder.health import Flow, rate_of
+from labcrane.streams.sync.report.sync_report import SyncReport
 from labcrane_bids.events import event_description, event_table
 from labcrane_learning.episodes import episodes_of, layout_of
 from labcrane_learning.lerobot import LeRobot
@@ -132,6 +136,7 @@ def test_a_movement_is_left_out_by_reason_where_one_of_two_views_stood_still(
     assert (is_result(table) == ~not_presented(table)).all()
 
 
+@pytest.mark.slow
 def test_a_slow_second_leaves_out_a_movement_that_was_fast_before_and_after(
     tmp_path: Path,
 ) -> None:
@@ -209,6 +214,7 @@ def test_labels_and_events_of_bids_name_movements_that_were_not_shown(
     assert meaning == PRESENTED["presentation_failed"][1]
 
 
+@pytest.mark.slow
 def test_an_episode_of_which_too_little_was_shown_is_no_success(
     stopped: tuple[SessionRecord, pd.Series], tmp_path: Path
 ) -> None:
@@ -402,3 +408,17 @@ def test_a_view_is_complained_about_as_it_is_now() -> None:
     assert limits.complaint(24.6, 3.2) == "has shown no picture for 3 s"
     assert limits.complaint(None, None) == "has shown no picture yet"
     assert PresentedLimits(max_gap_s=5.0).complaint(24.6, 3.2) == ""
+
+
+def test_the_page_at_the_end_tells_an_interruption_from_what_was_not_shown(tmp_path: Path) -> None:
+    (tmp_path / "study.yaml").write_text(VIEWED, encoding="utf-8")
+    order = visit_of(tmp_path / "study.yaml", "P001", 1, tmp_path / "data", simulated=True)
+    outcome = Outcome()
+    found = (Finding(Verdict.WARN, "what was found", "what to do"),)
+    for report, said in (
+        (SyncReport((), presented=found), "the operator saw or heard too little"),
+        (SyncReport((), interrupted=found), "it was paused for a view or sound that had failed"),
+    ):
+        page = left_behind(order, outcome, report)
+        assert (page.verdict, page.level) == (f"The session is complete and saved; {said}", "warn")
+        assert page.advice == ("WARN feedback: what was found; what to do",)
