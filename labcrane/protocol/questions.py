@@ -190,6 +190,7 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_what_is_not_used(study)
     yield from _of_what_is_not_asked(study)
     yield from _of_orders_of_steps(study)
+    yield from _of_orders_of_blocks(study)
     yield from _of_fading(study)
     yield from _of_answers(study)
     yield from _of_streams(study)
@@ -904,6 +905,38 @@ def _of_orders_of_steps(study: Study) -> Doubts:
         if kinds[-1] == "break":
             at = len(kinds) - 1
             yield ("sessions", number, "steps", at), f"session {session.name!r} ends with a break"
+
+
+def _of_orders_of_blocks(study: Study) -> Doubts:
+    """Question blocks of a session that differ and come in one order for everyone."""
+    before: dict[int, tuple[int, Block]] = {}
+    asked = set()
+    for place, kind, block in _steps(study):
+        session, at = int(place[1]), int(place[3])
+        if kind != "block" or block.condition is not None or session in asked:
+            continue
+        first, other = before.setdefault(session, (at, block))
+        switches = [
+            frozenset(study.protocol.feedback) if each.feedback == "all"
+            else frozenset() if each.feedback == "none"
+            else frozenset({"group"}) if each.feedback == "group"
+            else frozenset(each.feedback)
+            for each in (other, block)
+        ]  # fmt: skip
+        if other.task != block.task:
+            what, way = f"task ({other.task} and {block.task})", ""
+        elif switches[0] != switches[1]:
+            what = "feedback"
+            way = "; write them as design: conditions with order: {condition: latin_square}"
+        else:
+            continue
+        asked.add(session)
+        yield (
+            (*place, "task" if other.task != block.task else "feedback"),
+            f"steps {first + 1} and {at + 1} of {study.protocol.sessions[session].name!r} differ "
+            f"in {what} and come in this order for everyone, so that what it does cannot be told "
+            f"from what people learn{way}",
+        )
 
 
 def _of_commas(study: Study) -> Doubts:

@@ -75,9 +75,10 @@ def test_markers_of_the_second_task_are_recorded_in_its_block_alone(
     said = [json.loads(text) for text in stream.data.iloc[:, 0]]
     balls = [each for each in said if each["event"] == "ball"]
     assert len(balls) >= 2
-    shared, _ = session.events.query("name == 'block.start'")["time"]
-    assert shared <= stream.time.min()
-    trials = session.trials.groupby("block_name")["trial"].agg(set)
+    trials = session.trials.groupby("condition")["trial"].agg(set)
+    begun = session.events.query("name == 'trial.start'")
+    shared = begun["data"].map(lambda data: data.get("condition") == "two tasks")
+    assert begun["time"][shared].min() - 1.0 <= stream.time.min()
     assert {each["trial"] for each in balls} & trials["two tasks"]
     assert not {each["trial"] for each in balls} & trials["one task"]
 

@@ -620,6 +620,31 @@ def test_nothing_is_locked_or_amended_while_something_is_asked(
     assert lock.read_text() == locked
 
 
+@pytest.mark.parametrize(
+    ("second", "what"),
+    [
+        ("{task: aiming, pairs: 1, feedback: none}", "differ in feedback"),
+        ("{task: wide, pairs: 1}", "differ in task (aiming and wide)"),
+        ("{task: aiming, pairs: 1}", ""),
+        ("{task: aiming, pairs: 1, feedback: [ball]}", ""),
+    ],
+)
+def test_blocks_that_differ_in_one_order_for_everyone_are_asked_about(
+    tmp_path: Path, second: str, what: str
+) -> None:
+    block = "      - block: {task: aiming, pairs: 1}"
+    more = (block, f"{block}\n      - block: {second}")
+    wide = ("tasks:\n", "tasks:\n  wide: {use: aiming, movements: 2, width: 0.8}\n")
+    ball = ("sessions:", "feedback: {ball: {use: sphere}}\nsessions:")
+    asked = [
+        each.text
+        for each in questions(a_study(tmp_path, more, wide, ball))
+        if "come in this order for everyone" in each.text
+    ]
+    assert len(asked) == bool(what)
+    assert all(f"steps 1 and 2 of 'only' {what} and come" in text for text in asked)
+
+
 def test_a_trial_that_runs_out_of_time_is_asked_about(tmp_path: Path) -> None:
     done = rehearse(a_study(tmp_path, ("movements: 2", "movements: 2, limit_s: 1.5")))
     (question,) = done.questions
