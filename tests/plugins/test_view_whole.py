@@ -230,9 +230,9 @@ def test_check_warns_of_an_error_that_every_group_is_shown(
     path.write_text(SHORT + "views: {hum: {use: sonification}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     assert (
-        "question: views.hum: sonification tells how far the tip is from the target and on which "
-        "side the target is and whether the tip is inside the target, in every group and block; "
-        "put it under feedback, where the design says who is given it"
+        "question: views.hum: sonification tells how far the tip is from the target, up to 4 m and "
+        "on which side the target is and whether the tip is inside the target, in every group and "
+        "block; put it under feedback, where the design says who is given it"
     ) in capsys.readouterr().err
     path.write_text(SHORT + "views: {cab: {use: view, patch: {}}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
