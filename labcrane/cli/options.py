@@ -9,8 +9,10 @@ AsJson = Annotated[bool, typer.Option("--json", help="for programs")]
 PROTOCOL_FILE = "protocol.yaml"
 
 
-def _protocol_in(path: Path) -> Path:
+def protocol_in(path: Path | None) -> Path | None:
     """Return a study's file where its folder was given."""
+    if path is None:
+        return None
     inside = path / PROTOCOL_FILE
     return inside if inside.is_file() else path
 
@@ -20,7 +22,7 @@ ProtocolPath = Annotated[
     typer.Argument(
         metavar="PROTOCOL",
         help=f"the study's YAML file, or a folder with {PROTOCOL_FILE}",
-        callback=_protocol_in,
+        callback=protocol_in,
     ),
 ]
 DataBeside = Annotated[

@@ -209,9 +209,9 @@ def test_a_study_needs_looks_at_what_it_uses_and_at_nothing_else() -> None:
 def test_the_command_says_all_as_json_and_keeps_it_for_the_record(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "study.yaml").write_text(SHORT)
-    path = str(tmp_path / "study.yaml")
-    status = main(["doctor", "--protocol", path, "--json", "--local"])
+    (tmp_path / "protocol.yaml").write_text(SHORT)
+    folder = str(tmp_path)  # or the file
+    status = main(["doctor", "--protocol", folder, "--json", "--local"])
     said = json.loads(capfd.readouterr().out)
     areas = {check["area"] for check in said["checks"]}
     assert areas == {
@@ -222,7 +222,7 @@ def test_the_command_says_all_as_json_and_keeps_it_for_the_record(
     assert (status == 1) == bool(failed)
     assert any("two joysticks" in check["text"] for check in failed)
 
-    study = load(tmp_path / "study.yaml", discover())
+    study = load(tmp_path / "protocol.yaml", discover())
     visit = Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=False)
     file = run(visit, ScriptedConsole({3: [Command(Order.END)]}))
     context = labcrane.open_recording(file).session(1).context

@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labcrane.cli.commands.delay import measure_audio, measure_display
-from labcrane.cli.options import DataBeside, Local, data_folder, stay_on_this_computer
+from labcrane.cli.options import (
+    DataBeside,
+    Local,
+    data_folder,
+    protocol_in,
+    stay_on_this_computer,
+)
 from labcrane.cli.output import out
 from labcrane.cli.sync import STYLES
 from labcrane.errors import ProtocolError
@@ -20,7 +26,10 @@ if TYPE_CHECKING:
 
 def doctor(
     protocol: Annotated[
-        Path | None, typer.Option(help="look at what this study needs, and at nothing else")
+        Path | None,
+        typer.Option(
+            help="look at what this study needs, and at nothing else", callback=protocol_in
+        ),
     ] = None,
     data: DataBeside = None,
     peer: Annotated[

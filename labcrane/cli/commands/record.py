@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from labcrane.cli.options import Local, stay_on_this_computer
+from labcrane.cli.options import Local, protocol_in, stay_on_this_computer
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError, RecordingError, nearest
 
@@ -28,7 +28,8 @@ def streams(
         float | None, typer.Option(help="how long to watch; until Ctrl-C by default", min=0.1)
     ] = None,
     protocol: Annotated[
-        Path | None, typer.Option(help="whose monitors and streams to watch with")
+        Path | None,
+        typer.Option(help="whose monitors and streams to watch with", callback=protocol_in),
     ] = None,
     local: Local = False,
 ) -> None:

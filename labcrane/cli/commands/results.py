@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from labcrane.cli.commands.approval import today
-from labcrane.cli.options import stay_on_this_computer
+from labcrane.cli.options import protocol_in, stay_on_this_computer
 from labcrane.cli.output import out
 from labcrane.errors import LabcraneError, PluginError, ProtocolError, RecordingError
 
@@ -219,7 +219,8 @@ def replay(
     ] = False,
     begin: Annotated[float, typer.Option("--from", help="the second to show it from")] = 0.0,
     protocol: Annotated[
-        Path | None, typer.Option(help="run this protocol instead of the recorded one")
+        Path | None,
+        typer.Option(help="run this protocol instead of the recorded one", callback=protocol_in),
     ] = None,
     machine: Annotated[
         Path | None, typer.Option(help="operate this machine instead of the recorded one")
