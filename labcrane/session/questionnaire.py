@@ -208,7 +208,9 @@ class QuestionnaireRun:
             about["trial"] = after.number
         self._name = name
         self._rules = [rule for rule in study.protocol.stop_rules if rule.questionnaire == name]
-        drawn = (after.seed if after else plan.seed, step, name)
+        # The first session keeps the draws of recordings in which all sessions had the same ones.
+        later = (plan.number,) if plan.number > 1 else ()
+        drawn = (after.seed if after else plan.seed, step, name, *(() if after else later))
         self._seed = derive("answers", *drawn)
         asked = study.questionnaires[name]
         self._form = QuestionnaireForm(name, asked, about, answered, derive("cards", *drawn))

@@ -4,11 +4,14 @@ import json
 from pathlib import Path
 
 import pytest
-from rehearsal import SHORT, Rehearsal, a_study, rehearse
+from rehearsal import SHORT, Rehearsal, ScriptedConsole, a_study, rehearse
 
+from labcrane import open_recording
 from labcrane.cli.app import main
 from labcrane.protocol.study import Study
 from labcrane.session.commands import Command, Order
+from labcrane.session.session import run
+from labcrane.session.visit import Visit
 
 HEAD = SHORT.partition("sessions:")[0]
 RATINGS = """\
@@ -141,3 +144,17 @@ def test_a_simulated_participant_answers_everything_the_same_way_each_time(tmp_p
     )
     assert len(first) == 7
     assert first == again
+
+
+def test_simulated_people_do_not_answer_alike_in_every_session(tmp_path: Path) -> None:
+    asks = "    steps:\n      - questionnaire: subjective_accuracy\n"
+    sessions = "".join(f"  - name: day {day}\n{asks}" for day in range(1, 6))
+    study = a_study(tmp_path, HEAD + "sessions:\n" + sessions)
+    given = []
+    for session in range(1, 6):
+        visit = Visit(study, "P001", session, tmp_path / "data", simulated=True, fast=True)
+        file = run(visit, ScriptedConsole())
+        rows = open_recording(file).session(session).questionnaires
+        given += rows["value"][rows["item"] == "rating"].tolist()
+    assert len(given) == 5
+    assert len(set(given)) > 1
