@@ -93,8 +93,9 @@ def _columns(factors: Factors) -> Iterator[tuple[str, str, str]]:
         yield CONDITION, CONDITION, ""
     for name in factors.over_phases:
         yield named_factor(name, factors), name, ""
-    yield DISTANCE, DISTANCE, " m"
-    yield SIDE, SIDE, ""
+    for name, unit in ((DISTANCE, " m"), (SIDE, "")):
+        if name in factors.targets:
+            yield name, name, unit
     yield SEQUENCE, PLACE, ""
 
 

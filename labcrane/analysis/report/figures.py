@@ -218,18 +218,26 @@ def _line(who: str, fit: Regression | None) -> dict[str, object]:
 def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) -> Drawing:
     """Draw participants' means and the better of both learning curves for each.
 
-    Curves count from the first position of their session or block.
+    Curves count from the first position of their session or block. With too few positions to say
+    which is better, there are means alone.
     """
     series = []
-    better = curves[(curves["measure"] == measure) & (curves["better"] == "yes")]
-    people = {name: number for number, name in enumerate(better["participant"].unique())}
-    for row in better.itertuples(index=False):
+    fitted_to = curves[curves["measure"] == measure]
+    people = {name: number for number, name in enumerate(fitted_to["participant"].unique())}
+    phases = ["participant", *(["phase"] if "phase" in curves else [])]
+    drawn = 0
+    for row in (
+        fitted_to.sort_values("better").drop_duplicates(phases, keep="last").itertuples(index=False)
+    ):
         own = movements[movements["participant"] == row.participant]
-        if "phase" in better:
+        if "phase" in curves:
             own = own[own["phase"] == row.phase]
         means = own.groupby("sequence")[measure].mean()
         colour = COLOURS[people[row.participant] % len(COLOURS)]
         series.append(Series(_numbers(means.index), _numbers(means), colour, "dots"))
+        if row.better == "no":
+            continue
+        drawn += 1
         before = float((own["sequence"] - own["place"]).iloc[0]) if "place" in own else 0.0
         n = np.linspace(1, float(means.index.max()) - before, 100)
         curve: Callable[..., np.ndarray] = CURVES[str(row.curve)]
@@ -238,8 +246,9 @@ def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) ->
     panel = Panel(PLACE_WORDS, WORDS.get(measure, measure), series)
     caption = (
         f"Learning curves of {_begun(WORDS.get(measure, measure)).lower()}. Dots: each "
-        f"participant's means; lines: the better of an exponential and a power curve, n = "
-        f"{len(people)} {_people(len(people))}."
+        f"participant's means, n = {len(people)} {_people(len(people))}; lines: the better of an "
+        "exponential and a power curve"
+        + ("." if drawn else ", which positions are too few to tell here.")
     )
     return Drawing(f"learning_{measure}", caption, [panel], curves)
 

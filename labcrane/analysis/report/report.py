@@ -23,6 +23,7 @@ from labcrane.analysis.questionnaires import answers_of, scores_of
 from labcrane.analysis.report import figures, outcomes
 from labcrane.analysis.report.answer import answer, listed
 from labcrane.analysis.report.factors import (
+    CONDITION,
     GROUP,
     PLACE,
     Factors,
@@ -372,9 +373,10 @@ def _statistics(
 ) -> "tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame, pd.DataFrame, pd.DataFrame]":
     """Add the tests; return those of effects, contrasts, trends, time scales and practice."""
     page.heading("Statistics")
-    varies = [outcomes.named_factor(name, factors) for name in factors.over_phases]
+    varies = [CONDITION] * bool(factors.conditions)
+    varies += [outcomes.named_factor(name, factors) for name in factors.over_phases]
     page.say(
-        f"Within participants: {', '.join([*varies, 'sequence', 'distance', 'far_side'])}. Groups "
+        f"Within participants: {', '.join([*varies, outcomes.SEQUENCE, *factors.targets])}. Groups "
         f"between participants: {', '.join(factors.groups) or 'none'}. A sequence begins anew with "
         "each session or block."
     )
