@@ -8,12 +8,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from needs import needs
+from needs import GRAPHICS, needs
+from rehearsal import SHORT
 from slcan_adapter import SlcanAdapter
 from windows import an_x_server
 
 from labcrane import Offer, Settings
+from labcrane.analysis.presented import PresentedLimits
+from labcrane.cli.app import main
 from labcrane.core import Finding, Verdict
+from labcrane.feedback.picture_rate import judged
 from labcrane.testing import ExaminationContract
 from labcrane_can import labcrane_inputs
 from labcrane_can.avc import encode
@@ -35,6 +39,34 @@ class TestCan(ExaminationContract):
     @pytest.fixture
     def settings(self) -> Settings:
         return CanSettings(bus="virtual:doctor", valves=VALVES)
+
+
+@pytest.mark.slow
+@needs("Xvfb", *GRAPHICS)
+def test_the_doctor_draws_the_studys_own_picture_and_says_how_many_come_a_second(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = {}
+    with an_x_server() as display:
+        monkeypatch.setenv("DISPLAY", display)
+        for rate in (8, 20):
+            view = f"views: {{cab: {{use: view, size: [320, 180], rate_hz: {rate}}}}}\n"
+            (tmp_path / "protocol.yaml").write_text(SHORT + view, encoding="utf-8")
+            main(["doctor", "--protocol", str(tmp_path), "--local"])
+            lines = capsys.readouterr().out.splitlines()
+            (said[rate],) = [line for line in lines if "pictures a second of this study" in line]
+    assert said[8] == (
+        "FAIL view cab: shows 8 pictures a second of this study; 15 are needed, and no movement "
+        "would count"
+    )
+    assert said[20].startswith("WARN view cab: shows 20 pictures a second of this study; 15 are")
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "verdict"), [(14.9, "FAIL"), (15.0, "WARN"), (29.9, "WARN"), (30.0, "PASS")]
+)
+def test_pictures_are_enough_with_some_to_spare(rate_hz: float, verdict: str) -> None:
+    assert judged(rate_hz, PresentedLimits()).verdict.value == verdict
 
 
 class TestView(ExaminationContract):

@@ -1,7 +1,8 @@
 """The command that looks at the computer before a study day."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -82,8 +83,9 @@ def _examine(
     study = load(protocol, registry) if protocol else None
     folder = data_folder(data, protocol)
     needed = _session_bytes(study) if study else disk.NEEDED_BYTES
-    checks = []
-    for check in examine(folder, registry, study, needed_bytes=needed, peers=peers, move=move):
+    checks: list[Check] = []
+    looked = examine(folder, registry, study, needed_bytes=needed, peers=peers, move=move)
+    for check in chain(looked, _rates(study, checks)):
         checks.append(check)
         if not as_json:
             _print(check)
@@ -104,6 +106,23 @@ def _examine(
         Console(stderr=True, soft_wrap=True).print(said, markup=False)
     if found.verdict is Verdict.FAIL or (kept and kept.verdict is Verdict.FAIL):
         raise typer.Exit(1)
+
+
+def _rates(study: "Study | None", before: Sequence["Check"]) -> Iterator["Check"]:
+    """Yield how many pictures a second the operator's views show, of those that can be opened."""
+    from labcrane.core.findings import Verdict
+    from labcrane.doctor import apart
+    from labcrane.doctor.report import Check
+    from labcrane.feedback.picture_rate import WAIT_S, rate_examinations
+
+    if study is None:
+        return
+    for name, examination in rate_examinations(study).items():
+        area = f"view {name}"
+        if any(each.area == area and each.finding.verdict is Verdict.FAIL for each in before):
+            continue  # it cannot be opened, which is said
+        for finding in apart.examine(examination, wait_s=WAIT_S):
+            yield Check(area, finding)
 
 
 def _print(check: "Check") -> None:
