@@ -1,4 +1,4 @@
-"""What rounding leaves of numbers that are equal: no test is made of it."""
+"""Rounding: differences that come of it alone, of which no test is made."""
 
 import numpy as np
 
