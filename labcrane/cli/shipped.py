@@ -9,7 +9,7 @@ from labcrane.errors import ProtocolError, suggestion
 from labcrane.files.atomic import SHARED_FILE, write_text
 from labcrane.protocol.protocol import STUDY_NAME
 
-FOLDERS = ("protocols", "labcrane_studies")
+FOLDERS = ("protocols", "examples/designs", "labcrane_studies")
 """Where they are beside the package: in the repository, and in what a wheel installs."""
 
 LEFT = shutil.ignore_patterns("data", "*.lock*.json")
@@ -20,7 +20,7 @@ def shipped_studies() -> dict[str, Path]:
     """Return the folders of the studies that come with labcrane, by name."""
     beside = Path(labcrane.__file__).parents[1]
     found = (path.parent for name in FOLDERS for path in (beside / name).glob("*/protocol.yaml"))
-    return {folder.name: folder for folder in sorted(found)}
+    return {folder.name: folder for folder in sorted(found, key=lambda folder: folder.name)}
 
 
 def new_study(shipped: str, folder: Path) -> Path:

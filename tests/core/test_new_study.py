@@ -9,7 +9,7 @@ from labcrane.cli.app import main
 from labcrane.cli.shipped import shipped_studies
 
 ROOT = Path(__file__).parents[2]
-SHIPPED = ("aiming", "crane_pilot", "retrieval", "whole")
+SHIPPED = ("aiming", "crane_pilot", "crossover", "pre_post", "retrieval", "washout", "whole")
 ENGINE = {"aiming": "mujoco", "crane_pilot": "mujoco", "retrieval": "pybullet"}
 
 
@@ -18,7 +18,8 @@ def test_the_studies_that_come_with_it_are_those_that_its_help_names(
 ) -> None:
     assert tuple(shipped_studies()) == SHIPPED
     assert main(["new-study", "--help"]) == 0
-    assert "aiming, crane_pilot, retrieval or whole" in capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert f"{', '.join(SHIPPED[:-1])} or {SHIPPED[-1]}" in said
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -32,7 +33,7 @@ def test_a_copy_is_a_study_of_its_own_name_that_check_finds_fine(
     assert said.splitlines()[0] == f"study: {folder / 'protocol.yaml'}"
     assert main(["check", str(folder)]) == 0
     assert "study 'my_study' is fine" in capsys.readouterr().out
-    shipped = ROOT / "protocols" / name
+    shipped = shipped_studies()[name]
     copied = {path.relative_to(folder) for path in folder.rglob("*")}
     assert copied == {path.relative_to(shipped) for path in shipped.rglob("*")}
     for each in shipped.glob("*.yaml"):

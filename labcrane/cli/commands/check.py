@@ -19,7 +19,12 @@ if TYPE_CHECKING:
 
 
 def new_study(
-    shipped: Annotated[str, typer.Argument(help="aiming, crane_pilot, retrieval or whole")],
+    shipped: Annotated[
+        str,
+        typer.Argument(
+            help="aiming, crane_pilot, crossover, pre_post, retrieval, washout or whole"
+        ),
+    ],
     folder: Annotated[Path, typer.Argument(help="a new folder; the study takes its name")],
 ) -> None:
     """Copy a study that comes with labcrane, with everything it refers to, for you to change."""

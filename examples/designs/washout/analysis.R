@@ -1,0 +1,44 @@
+# The report's tests of movement time once more, with afex:
+#
+#   labcrane export data --to tables --set streams=none --out tables
+#   Rscript analysis.R tables
+#
+# It prints them, and writes them into analysis.csv. The report's are tables/anova.csv; those "with
+# pairs' means taken away" are not repeated here.
+
+suppressPackageStartupMessages(library(afex))
+
+folder <- c(commandArgs(TRUE), "tables")[1]
+trials <- read.csv(file.path(folder, "trials.csv"), na.strings = "")
+results <- subset(trials, practice == 0 & outcome == "success" & !is.na(movement_time))
+if ("presentation_failed" %in% names(results)) {  # pictures stood still: no result either
+  results <- subset(results, is.na(presentation_failed) | presentation_failed == 0)
+}
+
+# Positions of pairs of targets count from 1 in each session.
+rank <- function(x) match(x, sort(unique(x)))
+results$sequence <- ave(results$sequence, results$participant, results$session, FUN = rank)
+
+# Every effect of a design that is of all factors in `of`.
+test <- function(data, measure, within, of = within) {
+  fit <- aov_ez("participant", measure, data, within = within, fun_aggregate = mean)
+  plain <- anova(fit, correction = "none")
+  corrected <- anova(fit, correction = "GG")
+  effects <- rownames(plain)
+  asked <- sapply(strsplit(effects, ":"), function(parts) all(of %in% parts))
+  data.frame(
+    measure = measure, factor = effects, f = plain[, "F"], df1 = plain[, "num Df"],
+    df2 = plain[, "den Df"], p = plain[, "Pr(>F)"], p_gg = corrected[effects, "Pr(>F)"]
+  )[asked, ]
+}
+
+found <- suppressMessages(rbind(
+  test(results, "movement_time", "condition"),  # the question of the study
+  test(results, "movement_time", "session"),    # first or second day
+  test(results, "movement_time", c("session", "sequence"), "sequence"),
+  test(results, "movement_time", c("session", "distance"), "distance"),
+  test(results, "movement_time", c("session", "far_side"), "far_side"),
+  test(results, "movement_time", c("distance", "far_side"))
+))
+write.csv(found, "analysis.csv", row.names = FALSE)
+print(found, digits = 4, row.names = FALSE)
