@@ -67,9 +67,13 @@ def test_groups_are_of_one_size_and_only_their_training_differs() -> None:
     assert len(shown) == 2 * 4
 
 
-@pytest.fixture(
-    scope="module", params=[pytest.param(x, marks=pytest.mark.xdist_group(x)) for x in NAMES]
-)
+def once(name: str) -> object:
+    """Return a design to be made once; that of most tests in the gate, the others by night."""
+    marks = [pytest.mark.xdist_group(name), *([pytest.mark.long] if name != "crossover" else [])]
+    return pytest.param(name, marks=marks)
+
+
+@pytest.fixture(scope="module", params=map(once, NAMES))
 def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A design's study, as somebody copies it, with recordings, report and tables beside it."""
     folder: Path = tmp_path_factory.mktemp("design") / request.param
