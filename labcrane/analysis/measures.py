@@ -181,7 +181,7 @@ def measure_session(
         there = {name: told[name] for name in ANEW if any(name in row for row in recorded)}
         trials = trials.assign(**there)
     shown = presented(session)
-    return pd.concat([trials, _order(trials), measured, shown], axis=1)
+    return pd.concat([ordered(trials), measured, shown], axis=1)
 
 
 OF_TRIALS = ("sequence", "position", "constant_error", "absolute_error")
@@ -190,23 +190,17 @@ OF_TRIALS = ("sequence", "position", "constant_error", "absolute_error")
 
 def measures_of_trials(trials: "pd.DataFrame") -> "pd.DataFrame":
     """Return a session's trial table with :data:`OF_TRIALS`, for which no frame is needed."""
-    import pandas as pd
-
     moved = ~without_onset(trials)
     errors = {
         name: trials[of].astype(float).where(moved) if of in trials else float("nan")
         for name, of in (("constant_error", "error_along"), ("absolute_error", "error"))
     }
-    return pd.concat([trials, _order(trials)], axis=1).assign(**errors)
+    return ordered(trials).assign(**errors)
 
 
-def _order(trials: "pd.DataFrame") -> "pd.DataFrame":
-    import pandas as pd
-
-    return pd.DataFrame(
-        {"sequence": _sequence(trials), "position": np.arange(1, len(trials) + 1)},
-        index=trials.index,
-    )
+def ordered(trials: "pd.DataFrame") -> "pd.DataFrame":
+    """Return the trials of a session with their place in it: ``sequence`` and ``position``."""
+    return trials.assign(sequence=_sequence(trials), position=np.arange(1, len(trials) + 1))
 
 
 def _sequence(trials: "pd.DataFrame") -> "pd.Series[Any]":

@@ -123,7 +123,7 @@ def _not_begun(study: Study) -> Iterator[str]:
         kinds: set[tuple[int, str]] = set()
         rig = Rig.build(study, simulated=True)
         with loosely_watched((*rig.components, *rig.tasks.values())), rig.opened(study, 0):
-            for slot, name in enumerate(_planned_names(study), start=1):
+            for slot, name in enumerate(planned_names(study), start=1):
                 where = f"rehearsal, session {session.name!r}"
                 try:
                     plan = plan_session(study, name, number, slot)
@@ -169,7 +169,8 @@ def _begin(rig: Rig, task: Task, trial: Trial) -> None:
         rig.dynamics.reset(trial.planned.start_pose)
 
 
-def _planned_names(study: Study) -> Sequence[str]:
+def planned_names(study: Study) -> Sequence[str]:
+    """Return the pseudonyms of the planned participants, at most :data:`MOST_BEGUN` of them."""
     about = study.protocol.participants
     try:
         return pseudonyms(about.pattern, min(about.planned, MOST_BEGUN))
@@ -236,7 +237,7 @@ def _one_of_each_group(study: Study) -> Iterator[tuple[str, int]]:
     for slot in islice(count(1), max(1, len(groups))):  # each run of slots has every group once
         slots.setdefault(group_of(study.protocol.study, groups, slot), slot)
     for slot in slots.values():
-        yield _planned_names(study)[0], slot
+        yield planned_names(study)[0], slot
 
 
 def _shortened(steps: Sequence[PlannedStep]) -> Iterator[PlannedStep]:

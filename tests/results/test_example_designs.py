@@ -12,6 +12,7 @@ from labcrane.cli.app import main
 from labcrane.design.plan import plan_session
 from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import discover
+from labcrane.simulation.foreseen import foreseen_tests, in_words
 from results.consumers import needs_r, r
 
 DESIGNS = Path(__file__).parents[2] / "examples" / "designs"
@@ -131,3 +132,34 @@ def test_the_report_finds_what_was_put_into_the_cohort(made: Path) -> None:
         days = own.loc[("session", "")]
         assert days["ci_low"] < 0.0 < days["ci_high"], "everybody learns anew on each day"
     assert not any(reported(made, "anova")["confounded"])
+
+
+@pytest.mark.slow
+def test_a_rehearsal_names_the_tests_that_the_report_makes(
+    made: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tested = reported(made, "anova")
+    own = tested[tested["measure"] == "movement_time"].reset_index(drop=True)
+    told = foreseen_tests(study_of(made.name)).reset_index(drop=True)
+    pd.testing.assert_frame_equal(told, own[list(told)], check_dtype=False)
+    assert main(["check", "--rehearse", str(made)]) == 0
+    said = capsys.readouterr().out
+    for factor in own["factor"][~own["factor"].str.endswith(ALONE)]:
+        assert f" {factor};" in f"{said.rstrip()};"
+
+
+def test_a_rehearsal_says_what_the_plan_cannot_tell_apart(tmp_path: Path) -> None:
+    text = (DESIGNS / "crossover" / "protocol.yaml").read_text(encoding="utf-8")
+    (tmp_path / "protocol.yaml").write_text(
+        text.replace("condition: latin_square", "condition: as_written")
+    )
+    shutil.copy(DESIGNS / "crossover" / "instructions.md", tmp_path)
+    tests = foreseen_tests(load(tmp_path / "protocol.yaml", discover())).set_index("factor")
+    said = tests["confounded"]
+    assert (said["condition"], said["block"]) == (
+        "the order in which conditions came",
+        "conditions and feedback",
+    )
+    assert "condition (cannot be told from the order in which conditions came)" in in_words(
+        tests.reset_index()
+    )

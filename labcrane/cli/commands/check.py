@@ -80,6 +80,11 @@ def check(
         f"{protocol}: study {study.protocol.study!r} is fine: {sessions} "
         f"session{'s' if sessions > 1 else ''} on the {study.machine.title}{done}"
     )
+    if rehearse:
+        from labcrane.simulation.foreseen import foreseen_tests, in_words
+
+        if tests := in_words(foreseen_tests(study)):
+            typer.echo(f"{protocol}: {tests}")
 
 
 def examined(
