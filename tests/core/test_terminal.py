@@ -72,6 +72,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 @needs("terminals")
 def test_keys_start_pause_note_flag_and_end_a_session(folder: Path) -> None:
     command = [sys.executable, "-m", "labcrane", "run", "study.yaml"]
@@ -103,6 +104,7 @@ def test_keys_start_pause_note_flag_and_end_a_session(folder: Path) -> None:
     }
 
 
+@pytest.mark.slow
 @needs("terminals")
 def test_an_interrupt_from_the_keyboard_ends_the_session_in_order(folder: Path) -> None:
     command = [sys.executable, "-m", "labcrane", "run", "study.yaml"]
