@@ -29,9 +29,9 @@ def foreseen_tests(study: Study) -> pd.DataFrame:
         ``factor``, ``n`` and ``confounded`` of each test.
     """
     trials = pd.DataFrame(_trials(study))
-    if not set(trials) >= OF_AIMING:
+    aimed = trials.dropna(subset=[*OF_AIMING]) if set(trials) >= OF_AIMING else trials.iloc[:0]
+    if not len(aimed):
         return pd.DataFrame(columns=["factor", "n", "confounded"])
-    aimed = trials.dropna(subset=[*OF_AIMING])
     each = [ordered(own) for _, own in aimed.groupby(["participant", "session"], sort=False)]
     table = pd.concat(each, ignore_index=True)
     dice = np.random.default_rng(0)

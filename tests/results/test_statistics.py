@@ -1,6 +1,7 @@
 """Statistics against R, and against what was published."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -591,6 +592,25 @@ def test_a_measure_that_is_the_same_in_all_is_tested_by_nothing(
         assert own["p"].isna().all()
     with pytest.raises(NoModelError, match="all movements have the same value"):
         mixed_model(table, "constant")
+
+
+@pytest.mark.parametrize(
+    ("values", "why"),
+    [
+        (lambda t: 2.0 * t["difficulty"], "no scatter"),
+        (lambda t: t["participant"].factorize()[0] * 0.1, "no scatter"),
+        (lambda t: t["participant"].factorize()[0] * t["sequence"], "no scatter"),
+        (lambda t: t["sequence"] / 3.0, "no scatter"),
+        (lambda t: (t["group"] == "visual") * 1.0, "no scatter"),
+        (lambda t: t["y"].where(t["y"] < t["y"].max(), np.inf), "some values are infinite"),
+    ],
+)
+def test_a_measure_without_scatter_has_no_model_and_says_why(
+    values: Callable[[pd.DataFrame], pd.Series], why: str
+) -> None:
+    cohort = awkward(12)
+    with pytest.raises(NoModelError, match=why):
+        mixed_model(cohort.assign(y=values(cohort)), "y")
 
 
 def test_a_time_of_0_is_kept_and_the_time_modelled_as_it_is(two_groups: pd.DataFrame) -> None:

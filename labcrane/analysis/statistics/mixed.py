@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from labcrane.analysis.statistics.confounding import dummies
 from labcrane.analysis.statistics.rounding import alike
 from labcrane.types import FloatArray
 
@@ -40,6 +41,9 @@ DEPENDENT = 1e-8
 
 BOUNDARY = 1e-4
 """Least eigenvalue of people's covariance against the residual; below it there is none of it."""
+
+LEAST_SCATTER = 1e-5
+"""Share of the values' standard deviation; below it, rounding spoils the sums of squares."""
 
 FLAT = 1e-7
 """Deviance that tells nothing apart."""
@@ -113,7 +117,8 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel:
     Raises
     ------
     NoModelError
-        With fewer than three participants, a measure that is the same in all, or too few movements.
+        With fewer than three participants, too few movements, values that are infinite or all the
+        same, or none that scatters about the terms and the participants' own means and slopes.
     """
     import pandas as pd
     from scipy.stats import t as distribution
@@ -123,6 +128,8 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel:
     if people < LEAST:
         raise NoModelError(f"{people} participants have a value, and {LEAST} are needed")
     y = data["y"].to_numpy(float)
+    if not np.isfinite(y).all():
+        raise NoModelError("some values are infinite")
     if alike(y):
         raise NoModelError("all movements have the same value")
     names, columns = _columns(data)
@@ -135,7 +142,14 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel:
             f"{len(data)} movements of {people} participants are too few for a mean and a slope of "
             "each"
         )
-    fit = _Fit(columns[:, kept], y, random, data["participant"].factorize()[0])
+    who = data["participant"].factorize()[0]
+    scatter = _scatter(columns[:, kept], y, random, who)
+    if scatter <= LEAST_SCATTER * float(y.std()):
+        raise NoModelError(
+            "the terms and each participant's mean and slope give every value, so that there is no "
+            "scatter to test them against"
+        )
+    fit = _Fit(columns[:, kept], y, random, who, scatter)
     t = fit.estimates / fit.errors
     terms = pd.DataFrame(
         {
@@ -219,17 +233,27 @@ def _independent(columns: FloatArray) -> list[int]:
     return kept
 
 
+def _scatter(x: FloatArray, y: FloatArray, z: FloatArray, who: Any) -> float:
+    """Return the standard deviation about the terms and people's own means and slopes."""
+    of_people = (dummies(who)[:, :, None] * z[:, None, :]).reshape(len(y), -1)
+    both = np.hstack([x, of_people])
+    rest = y - both @ np.linalg.lstsq(both, y, rcond=None)[0]
+    return float(rest.std())
+
+
 class _Fit:
     """The fit of ``y = x·b + z·u + e`` with u of each participant and e normal.
 
-    Everything is worked out of cross products of each participant. Columns and ``y`` are scaled to
-    about 1 before, and results are scaled back.
+    Everything is worked out of cross products of each participant. Columns are scaled to about 1
+    and ``y`` to a residual of about 1 before, and results are scaled back.
     """
 
-    def __init__(self, x: FloatArray, y: FloatArray, z: FloatArray, who: Any) -> None:
+    def __init__(
+        self, x: FloatArray, y: FloatArray, z: FloatArray, who: Any, scatter: float
+    ) -> None:
         self._n, self._p = x.shape
         self._x, self._back = np.linalg.qr(x)
-        self._y_scale = float(y.std())
+        self._y_scale = scatter
         self._z_scale = np.sqrt((z**2).mean(axis=0))
         z = z / self._z_scale
         first = self._x.T @ y
@@ -358,18 +382,21 @@ class _Fit:
 
 
 STEP = 1e-4
-"""Of parameters that are about 1, for derivatives."""
+"""Of parameters that are about 1, for derivatives; of larger ones, their share."""
 
 
 def _slopes(of: Callable[[FloatArray], FloatArray], at: FloatArray) -> FloatArray:
     """Return the derivatives of a function by each parameter, one row each."""
-    steps = STEP * np.eye(len(at))
-    return np.stack([(of(at + step) - of(at - step)) / (2.0 * STEP) for step in steps])
+    sizes = STEP * np.maximum(1.0, np.abs(at))
+    return np.stack(
+        [(of(at + step) - of(at - step)) / (2.0 * step.sum()) for step in np.diag(sizes)]
+    )
 
 
 def _hessian(of: Callable[[FloatArray], float], at: FloatArray) -> FloatArray:
     """Return the second derivatives of a function."""
-    steps = STEP * np.eye(len(at))
+    sizes = STEP * np.maximum(1.0, np.abs(at))
+    steps = np.diag(sizes)
     made = np.array(
         [
             [
@@ -379,4 +406,4 @@ def _hessian(of: Callable[[FloatArray], float], at: FloatArray) -> FloatArray:
             for one in steps
         ]
     )
-    return made / (4.0 * STEP**2)
+    return made / (4.0 * np.outer(sizes, sizes))
