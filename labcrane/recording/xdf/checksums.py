@@ -3,7 +3,7 @@
 XDF has no checksums, so labcrane writes a stream of its own, ``labcrane.check``. Each sample
 says where a chunk ends and what the CRC-32 of the file up to there is. Any stretch between two
 known ends can be verified alone: ``crc32(data[a:b], crc_a) == crc_b``
-(docs/decisions/0003-journal-integrity.md).
+(docs/decisions/0003-recordings-verify-themselves.md).
 """
 
 import itertools

@@ -2,7 +2,7 @@
 
 Every call is one write to the operating system. Beside what the specification asks for, a stream
 of its own, ``labcrane.check``, holds the running CRC-32 of all that was written
-(docs/decisions/0003-journal-integrity.md).
+(docs/decisions/0003-recordings-verify-themselves.md).
 """
 
 import struct
