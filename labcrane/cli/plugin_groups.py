@@ -13,7 +13,7 @@ from labcrane.registry.entry_points import entry_points_of
 
 GROUP = "labcrane.commands"
 """Entry points that name a group of commands, and the module with its hook: known without importing
-any plugin (docs/decisions/0091-groups-by-entry-point.md)."""
+any plugin (docs/decisions/0110-offers-by-entry-point.md)."""
 
 DOCSTRING = re.compile(r"(?:\s|#.*\n)*(?P<quote>\"{3}|'{3}|\"|')(?P<line>.+?)(?:(?P=quote)|\n)")
 """How a module begins that says what it is for."""
