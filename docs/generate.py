@@ -296,12 +296,29 @@ def with_floors(page: str) -> str:
     return FLOORS.sub(lambda match: f"{match[1]}{floors()}\n{match[2]}", page)
 
 
+TOPICS = (
+    "clocks", "record", "processes", "streams", "feedback", "pages", "computer", "protocol",
+    "people", "analysis", "simulation", "machines", "tests", "plugins",
+)  # fmt: skip
+
+
 def decisions_page() -> str:
-    """Return the list of decisions with their titles."""
-    lines = ["# Decisions", "", "Choices that took an argument: why, what, and what follows.", ""]
+    """Return the list of decisions by topic, with the numbers that each page includes."""
+    found: dict[str, list[str]] = {topic: [] for topic in TOPICS}
     for path in sorted((HERE / "decisions").glob("[0-9]*.md")):
-        title = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")
-        lines.append(f"- [{title}]({path.name})")
+        head = path.read_text(encoding="utf-8").splitlines()[:5]
+        title = head[0].removeprefix("# ")
+        marks = dict(line.split(": ", 1) for line in head[1:] if ": " in line)
+        also = f" (also {marks['Includes']})" if "Includes" in marks else ""
+        found[marks["Topic"]].append(f"- [{title}]({path.name}){also}")
+    lines = [
+        "# Decisions",
+        "",
+        "Choices that took an argument: what was decided, why, and what was rejected.",
+        "A number that the code cites is that of a page, or one of those in brackets.",
+    ]
+    for topic, links in found.items():
+        lines += ["", f"## {topic.capitalize()}", "", *links]
     return "\n".join([*lines, ""])
 
 

@@ -85,7 +85,39 @@ def test_the_signals_are_those_that_a_recording_has(pages: dict[str, str]) -> No
 
 def test_every_decision_is_listed(pages: dict[str, str]) -> None:
     listed = re.findall(r"\((\d{4}-[\w-]+\.md)\)", pages["decisions/index.md"])
-    assert listed == sorted(path.name for path in (ROOT / "docs" / "decisions").glob("0*.md"))
+    decisions = [path.name for path in (ROOT / "docs" / "decisions").glob("0*.md")]
+    assert sorted(listed) == sorted(decisions)
+    assert len(decisions) <= 90
+
+
+CITED = re.compile(r"\bdecisions?[ /]0*(\d{1,4})\b", re.IGNORECASE)
+
+
+def test_every_number_of_a_decision_leads_to_one_page(pages: dict[str, str]) -> None:
+    of_pages = re.findall(r"^- \[(\d+)\. ", pages["decisions/index.md"], re.M)
+    merged = re.findall(r"\(also ([\d, ]+)\)$", pages["decisions/index.md"], re.M)
+    numbers = [*of_pages, *(number for each in merged for number in each.split(", "))]
+    assert len(numbers) == len(set(numbers))
+    cited = {
+        number
+        for top in ("labcrane", "plugins", "docs", "benchmarks", "examples", "tests")
+        for path in (ROOT / top).rglob("*")
+        if path.suffix in {".py", ".md", ".yaml"}
+        for number in CITED.findall(path.read_text(encoding="utf-8"))
+    }
+    assert cited <= set(numbers)
+    assert len(cited) > 10
+
+
+@pytest.mark.parametrize(
+    "page", sorted((ROOT / "docs" / "decisions").glob("0*.md")), ids=lambda page: page.name[:4]
+)
+def test_a_decision_has_a_short_title_and_at_most_400_words(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    number, title = re.fullmatch(r"# (\d+)\. (.+)", text.splitlines()[0]).groups()  # type: ignore[union-attr]
+    assert int(number) == int(page.name[:4])
+    assert len(title) <= 72
+    assert len(text.split()) <= 420
 
 
 def test_links_within_a_generated_page_lead_to_its_headings(pages: dict[str, str]) -> None:
