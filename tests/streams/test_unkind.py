@@ -202,6 +202,21 @@ def test_a_device_is_worse_by_its_mean_or_by_the_worst_of_twenty_draws() -> None
     assert worse_rows([*even, *mean, *tail]) == ["mean", "tail"]
 
 
+def test_two_unlucky_draws_of_a_coarse_unit_say_nothing_and_fifty_that_are_worse_do() -> None:
+    random = np.random.default_rng(16)
+    usual = random.uniform(0.0, 20.0, 50)
+    ours = usual + 0.3 + random.normal(0.0, 0.2, 50)
+    draws = [
+        a_score(row="unit", chance=True, p95=each, usual=other)
+        for each, other in zip(ours, usual, strict=True)
+    ]
+    unlucky = a_score(row="unit", chance=True, p95=11.39, usual=9.95)
+    lucky = a_score(row="unit", chance=True, p95=0.24, usual=0.35)
+    assert worse_rows([unlucky, lucky]) == []
+    assert worse_rows([unlucky]) == []
+    assert worse_rows(draws) == ["unit"]
+
+
 @pytest.mark.soak
 @pytest.mark.timeout(1800)
 def test_fifty_draws_of_each_hold_what_the_report_promises() -> None:
