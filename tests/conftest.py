@@ -22,7 +22,7 @@ from needs import need, not_tried
 from once import RUN_FOLDER
 from parts import Parts, add_options, asked_for
 from port_block import claim
-from second_try import GATE, QUICK, SecondTry
+from second_try import GATE, PASSED, QUICK, SecondTry, leave_out_passed
 
 from labcrane.streams.network import LOOPBACK
 
@@ -77,7 +77,8 @@ def pytest_configure(config: pytest.Config) -> None:
     if asked_for(config):
         config.pluginmanager.register(Parts(config))
     if GATE in os.environ and not hasattr(config, "workerinput"):
-        config.pluginmanager.register(SecondTry(config, Path(os.environ.pop(GATE))))
+        passed = Path(os.environ[PASSED]) if PASSED in os.environ else None
+        config.pluginmanager.register(SecondTry(config, Path(os.environ.pop(GATE)), passed))
 
 
 @pytest.hookimpl(optionalhook=True)  # pytest -p no:xdist
@@ -102,8 +103,9 @@ def pytest_sessionfinish() -> None:
 
 
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the marks
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Keep the tests of a file in one process, which makes their fixtures once."""
+    leave_out_passed(config, items)
     for item in items:
         if item.get_closest_marker("xdist_group") is None and _shares(item):
             item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))

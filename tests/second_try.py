@@ -1,8 +1,9 @@
 """A second try for tests that failed in the gate, and what the gate says of a run.
 
-A computer that does other work can make a right test fail. So the gate runs what failed once more,
-alone, when everything else has ended. What passes then is named, and its run is green; a test that
-fails twice, or more than ``MOST`` that fail once, is red. ``pytest`` by itself gives no second try.
+A test that has passed in one stage of the gate is not run in the next one. A computer that does
+other work can make a right test fail. So the gate runs what failed once more, alone, when
+everything else has ended. What passes then is named, and its run is green; a test that fails twice,
+or more than ``MOST`` that fail once, is red. ``pytest`` by itself gives no second try.
 """
 
 import json
@@ -15,6 +16,9 @@ import pytest
 
 GATE = "LABCRANE_GATE"
 """Names the file that the stages of a gate write their runs into; set by the gate alone."""
+
+PASSED = "LABCRANE_PASSED"
+"""Names the file of the tests that have passed in this gate: each passes once."""
 
 QUICK = "not slow and not long and not soak"
 """What ``pytest`` runs without a word; pyproject.toml says so too."""
@@ -32,6 +36,17 @@ LASTS_S = 1200.0
 """How long the second tries may take together."""
 
 
+def leave_out_passed(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Take out of the collected tests those that have passed in an earlier stage of the gate."""
+    path = Path(os.environ.pop(PASSED, ""))  # a pytest that a test starts has its own tests
+    if not path.is_file():
+        return
+    passed = set(path.read_text(encoding="utf-8").splitlines())
+    if left_out := [item for item in items if item.nodeid in passed]:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item.nodeid not in passed]
+
+
 class SecondTry:
     """Tries once more what failed, and notes counts, times and second tries in a file.
 
@@ -41,11 +56,15 @@ class SecondTry:
         Of the process that was started, not of one of its workers.
     path
         A line of JSON is added to it for this run; the lines of the same gate count together.
+    passed
+        Gets the names of the tests that pass; None keeps none.
     """
 
-    def __init__(self, config: pytest.Config, path: Path) -> None:
+    def __init__(self, config: pytest.Config, path: Path, passed: Path | None = None) -> None:
         self._root = config.rootpath
         self._path = path
+        self._passed = passed
+        self._ended: set[str] = set()
         self._failed: dict[str, None] = {}
         self._counts = {"passed": 0, "failed": 0, "skipped": 0}
         self._seconds: dict[str, float] = {}
@@ -64,6 +83,8 @@ class SecondTry:
             self._failed[name] = None
         elif report.skipped or report.when == "call":
             self._counts[report.outcome] += 1
+            if report.passed:
+                self._ended.add(name)
 
     @pytest.hookimpl(trylast=True)  # when the workers have ended
     def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
@@ -98,6 +119,9 @@ class SecondTry:
         }
         with self._path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
+        if self._passed is not None:
+            with self._passed.open("a", encoding="utf-8") as file:
+                file.writelines(f"{name}\n" for name in sorted(self._ended - set(self._failed)))
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         """End with quick tests that are not quick, the processor's time, and second tries."""

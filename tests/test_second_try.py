@@ -24,13 +24,17 @@ CONFTEST = """
 import os
 from pathlib import Path
 import second_try
-from second_try import GATE, SecondTry
+from second_try import GATE, PASSED, SecondTry, leave_out_passed
 
 second_try.QUICK_PROCESSOR_S = 0.0
 
 def pytest_configure(config):
     if GATE in os.environ and not hasattr(config, "workerinput"):
-        config.pluginmanager.register(SecondTry(config, Path(os.environ.pop(GATE))))
+        passed = Path(os.environ[PASSED])
+        config.pluginmanager.register(SecondTry(config, Path(os.environ.pop(GATE)), passed))
+
+def pytest_collection_modifyitems(config, items):
+    leave_out_passed(config, items)
 """
 
 
@@ -46,7 +50,10 @@ def gate_in(
     (folder / "test_some.py").write_text(tests)
     (folder / "conftest.py").write_text(CONFTEST)
     (folder / "pytest.ini").write_text("[pytest]\n")
-    here = {"PYTHONPATH": str(Path(__file__).parent), "PATH": "", "LABCRANE_GATE": "runs"}
+    here = {
+        "PYTHONPATH": str(Path(__file__).parent), "PATH": "",
+        "LABCRANE_GATE": "runs", "LABCRANE_PASSED": "passed",
+    }  # fmt: skip
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-n", processes, *words],
         cwd=folder, env=here, capture_output=True, text=True, check=False,
@@ -75,6 +82,7 @@ def test_what_fails_twice_is_red(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_more_than_three_in_all_stages_of_a_gate_get_no_second_try(tmp_path: Path) -> None:
     assert gate_in(tmp_path, once=(0, 1))[0] == 0
+    (tmp_path / "passed").unlink()
     for tried in tmp_path.glob("tried-*"):
         tried.unlink()
     status, said, _ = gate_in(tmp_path, once=(0, 1))
@@ -97,4 +105,18 @@ def test_quick_tests_that_take_too_much_of_a_processor_are_named_and_fail_nothin
     status, said, _ = gate_in(tmp_path, "-m", QUICK)
     assert status == 0
     assert "s of processor: more than the 0 s of quick tests" in said
+    (tmp_path / "passed").unlink()
     assert "of quick tests" not in gate_in(tmp_path)[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("processes", ["0", "2"])
+def test_what_passed_in_one_stage_is_not_run_in_the_next(tmp_path: Path, processes: str) -> None:
+    gate_in(tmp_path, always=(2, 5), processes=processes)
+    passed = [f"test_some.py::test_it[{number}]" for number in (0, 1, 3, 4)]
+    assert (tmp_path / "passed").read_text().split() == passed
+    for tried in tmp_path.glob("tried-*"):
+        tried.unlink()
+    status, _, noted = gate_in(tmp_path, processes=processes)
+    assert (status, noted["passed"]) == (0, 2)
+    assert sorted(path.name for path in tmp_path.glob("tried-*")) == ["tried-2", "tried-5"]
