@@ -21,7 +21,7 @@ from labcrane.errors import LabcraneError, PluginError, ProtocolError
 MODULES = {
     "run": ("demo", "run", "resume"),
     "check": ("new_study", "check", "plan"),
-    "doctor": ("doctor",),
+    "doctor": ("doctor", "report_problem"),
     "plugins": ("schema", "new_plugin"),
     "language_server": ("language_server",),
     "record": ("streams", "record", "recover", "resync"),

@@ -8,8 +8,8 @@ from typer.core import TyperCommand, TyperGroup
 
 SECTIONS = {
     "Prepare a study": (
-        "new-study", "check", "plan", "doctor", "feedback", "simulate", "power", "tracks",
-        "approve", "amend", "methods", "bundle", "plugins", "new-plugin", "schema",
+        "new-study", "check", "plan", "doctor", "report-problem", "feedback", "simulate", "power",
+        "tracks", "approve", "amend", "methods", "bundle", "plugins", "new-plugin", "schema",
         "language-server",
     ),
     "Run it": ("demo", "run", "resume", "consent", "streams", "record"),

@@ -227,8 +227,8 @@ IN_THE_DATA_FOLDER = {
 
 OF_NOBODY = {
     "demo", "simulate", "tracks", "compare-engines", "doctor", "approve", "amend", "methods",
-    "bundle", "schema", "new-study", "new-plugin", "streams", "record", "gateway can", "dmd fit",
-    "dmd plot", "dmd record", "dmd validate",
+    "bundle", "report-problem", "schema", "new-study", "new-plugin", "streams", "record",
+    "gateway can", "dmd fit", "dmd plot", "dmd record", "dmd validate",
 }  # fmt: skip
 """They write of simulated operators, a computer, a machine or a protocol, and no pseudonym."""
 

@@ -1,7 +1,8 @@
-"""The command that looks at the computer before a study day."""
+"""Commands that look at the computer: before a study day, and for a report of a problem."""
 
 import json
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,11 +19,16 @@ from labcrane.cli.options import (
 )
 from labcrane.cli.output import out
 from labcrane.cli.sync import STYLES
-from labcrane.errors import ProtocolError
+from labcrane.errors import LabcraneError, ProtocolError, RecordingError, nearest
 
 if TYPE_CHECKING:
-    from labcrane.doctor.report import Check
+    from labcrane.doctor.report import Check, Diagnosis
     from labcrane.protocol.study import Study
+
+ARCHIVE = Path("labcrane-problem.zip")
+
+MOST_LINES = 60
+"""Lines of a file that are printed at once; ``--show`` prints all of them."""
 
 
 def doctor(
@@ -151,3 +157,104 @@ def _session_bytes(study: "Study") -> float:
         for number in range(1, len(study.protocol.sessions) + 1)
     )
     return needed_bytes(longest, frame_bytes(run) * run.rate_hz, RESERVE_S)
+
+
+def report_problem(
+    protocol: Annotated[
+        Path | None, typer.Option(help="the study that it is about", callback=protocol_in)
+    ] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option(help="data folder, or a part of it; data/ beside the protocol by default"),
+    ] = None,
+    session: Annotated[
+        int | None, typer.Option(help="which session; the last one written by default", min=1)
+    ] = None,
+    to: Annotated[Path, typer.Option(help="file that is written; must be new")] = ARCHIVE,
+    show: Annotated[
+        str | None, typer.Option(help="print this file of the archive, and write nothing")
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="do not ask; for scripts")] = False,
+    local: Local = False,
+) -> None:
+    """Write an archive for a bug report, with nothing of people in it.
+
+    It is shown before it is written. It has the doctor's findings, versions, and the events and
+    timing of the last session: no answers, notes, pseudonyms, users, computers or folders.
+    """
+    from labcrane.cli.problem_report import check_new, compose, find_session, write
+    from labcrane.files.names import absent
+
+    if local:
+        stay_on_this_computer()
+    if show is None:
+        check_new(to)  # before the doctor takes half a minute
+    if protocol is not None and not protocol.is_file():
+        raise ProtocolError(f"{protocol}: {absent(protocol)}")
+    folder = data_folder(data, protocol)
+    if data is not None and not folder.is_dir():
+        raise RecordingError(f"there is no folder {folder}; give the study's data folder")
+    found_session = find_session(folder, session)
+    found, trouble = _examined(protocol, folder)
+    study_folder = protocol.parent if protocol else Path()
+    files = compose(found, trouble, found_session, (folder, study_folder))
+    if show is not None:
+        if show not in files:
+            raise ProtocolError(f"--show {show}: {nearest(show, files, 'the archive has')}")
+        print(files[show], end="")
+        return
+    _print_files(files)
+    if found_session is None:
+        out.print(f"no session: there is no journal below {folder}", markup=False)
+    if not (yes or _agreed(to)):
+        out.print("nothing was written")
+        return
+    write(files, to)
+    out.print(f"written: {to}", markup=False)
+
+
+def _examined(protocol: Path | None, folder: Path) -> tuple["Diagnosis", Sequence[str]]:
+    """Return what the doctor finds, and why a study could not be read: both belong to a report."""
+    from labcrane.doctor.checks import examine, left_out
+    from labcrane.doctor.report import diagnosis
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
+
+    registry, study, trouble = discover(), None, list[str]()
+    if protocol is not None:
+        try:
+            with_own = discover(study=protocol)
+            study, registry = load(protocol, with_own), with_own
+        except LabcraneError as error:
+            trouble.append(str(error))
+    found = diagnosis(examine(folder, registry, study), left_out(registry, study))
+    return found, trouble
+
+
+def _print_files(files: Mapping[str, str]) -> None:
+    """Print every file with its size, and as much of it as can be read at once."""
+    for name, text in files.items():
+        lines = text.splitlines()
+        out.print(f"== {name}, {len(text.encode())} bytes", markup=False, style="bold")
+        print("\n".join(lines[:MOST_LINES]))
+        if (more := len(lines) - MOST_LINES) > 0:
+            out.print(
+                f"... and {more} lines more; the same command with --show {name} prints all of it",
+                markup=False,
+            )
+
+
+def _agreed(to: Path) -> bool:
+    """Ask whether all of that may be written.
+
+    Raises
+    ------
+    ProtocolError
+        There is no terminal.
+    """
+    if not sys.stdin.isatty():
+        raise ProtocolError(
+            "nothing was written: it is shown first, and there is no terminal at which to ask; "
+            "--yes writes it without asking, --show NAME prints one of its files"
+        )
+    return typer.confirm(f"Write these files into {to}?")

@@ -1,0 +1,284 @@
+"""A problem report has what explains a fault, and nothing of people in any of its bytes."""
+
+import json
+import platform
+import shutil
+import socket
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from faults.sessions import STUDY, kill_all, labcrane, wait_for
+from governance.test_commands import Terminal
+from rehearsal import ScriptedConsole
+
+from labcrane.cli.app import main
+from labcrane.cli.problem_report import KEPT, Cleaner
+from labcrane.core.findings import Finding, Verdict
+from labcrane.core.records import Event
+from labcrane.doctor.report import Check
+from labcrane.protocol.study import load
+from labcrane.recording.journal import Column, SessionJournal
+from labcrane.registry.registry import discover
+from labcrane.session.commands import Command, Order
+from labcrane.session.session import Visit, run
+
+FOLDER, PERSON, HOST, USER = "Zwiebel Labor", "QX417", "hexenhaus-7", "qbertuser"
+NOTE, AMPLIFIER = "hums a tune", "amplifier-pc-3"
+PLANTED = (FOLDER, "zwiebel", PERSON, HOST, USER, NOTE, AMPLIFIER)
+
+FOUND = (
+    Check("disk", Finding(Verdict.PASS, f"/home/{USER}/{FOLDER}/data on {HOST} is ext4")),
+    Check("input", Finding(Verdict.FAIL, "no joystick", "plug one in")),
+    Check("lsl", Finding(Verdict.PASS, f"stream 'eeg' comes from {AMPLIFIER}")),
+)
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A computer with planted names, and a doctor that takes no time."""
+    folder = tmp_path / FOLDER
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("USER", USER)
+    monkeypatch.setattr(platform, "node", lambda: HOST)
+    monkeypatch.setattr("labcrane.doctor.checks.examine", lambda *_, **__: FOUND)
+    monkeypatch.setattr("labcrane.doctor.checks.left_out", lambda *_: ())
+    return folder
+
+
+def a_protocol(folder: Path) -> Path:
+    path = folder / "protocol.yaml"
+    people = "participants: {pattern: 'QX[0-9]{3}'}\ntitle:"
+    path.write_text(STUDY.format(study="onion").replace("title:", people), encoding="utf-8")
+    return path
+
+
+def a_journal(folder: Path, session: int = 1, events: tuple[Event, ...] = ()) -> Path:
+    path = folder / f"ses-{session:02d}_run.xdf"
+    folder.mkdir(parents=True, exist_ok=True)
+    with SessionJournal(path, [Column("loop", "tick", "1")], 240.0) as journal:
+        for event in (Event("session.start", 5.0, {"participant": folder.name}), *events):
+            journal.write_event(event, 0)
+    return path
+
+
+def bytes_of(archive: Path) -> bytes:
+    with zipfile.ZipFile(archive) as opened:
+        inside = [opened.read(name) for name in opened.namelist()]
+    return b"\n".join([archive.read_bytes(), *inside]).lower()
+
+
+def file_of(archive: Path, name: str) -> str:
+    with zipfile.ZipFile(archive) as opened:
+        return opened.read(name).decode()
+
+
+def events_of(archive: Path) -> list[dict[str, object]]:
+    return [json.loads(line) for line in file_of(archive, "session/events.jsonl").splitlines()]
+
+
+def planted_in(archive: Path) -> list[str]:
+    everything = bytes_of(archive)
+    also = [name for name in (socket.gethostname(),) if len(name) > 3]
+    return [each for each in (*PLANTED, *also) if each.lower().encode() in everything]
+
+
+def report(*words: object, status: int = 0) -> Path:
+    archive = Path("report.zip")
+    assert main(["report-problem", "--to", str(archive), *map(str, words)]) == status
+    return archive
+
+
+@pytest.mark.slow
+def test_nothing_of_people_is_in_any_byte_of_the_report_of_a_session(here: Path) -> None:
+    protocol = a_protocol(here)
+    visit = Visit(load(protocol, discover()), PERSON, 1, here / "data", simulated=True, fast=True)
+    run(visit, ScriptedConsole({50: [Command(Order.NOTE, f"{PERSON} {NOTE}")]}))
+    archive = report("--protocol", protocol, "--yes")
+    assert planted_in(archive) == []
+    timing = json.loads(file_of(archive, "session/timing.json"))
+    assert timing["ticks"] > 100
+    assert {"events_counted", "journals"} <= set(json.loads(file_of(archive, "session/about.json")))
+    kept = events_of(archive)
+    assert {each["event"] for each in kept} >= {"session.start", "trial.end", "session.end"}
+    assert not {key for each in kept for key in each} & {
+        "text",
+        "outcome",
+        "movement_time",
+        "value",
+    }
+
+
+@pytest.fixture(scope="module")
+def killed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A study whose session was killed while it ran."""
+    folder = tmp_path_factory.mktemp("killed") / FOLDER
+    folder.mkdir()
+    words = ("run", a_protocol(folder), "--participant", PERSON, "--simulate")
+    first = labcrane(*words, "--fast", cwd=folder)
+    said, _ = first.communicate(timeout=120)
+    assert first.returncode == 0, said
+    second = labcrane(*words, "--session", 2, cwd=folder)
+    journal = folder / "data" / f"{PERSON}-SIMULATED" / "ses-02_run.xdf"
+    wait_for(lambda: journal.exists() and b'"trial.start"' in journal.read_bytes())
+    kill_all(second)
+    second.communicate(timeout=120)
+    yield folder
+    shutil.rmtree(folder)
+
+
+@pytest.mark.slow
+def test_nothing_of_people_is_in_any_byte_of_the_report_of_a_killed_session(killed: Path) -> None:
+    archive = report("--protocol", killed, "--yes")
+    assert planted_in(archive) == []
+    about = json.loads(file_of(archive, "session/about.json"))
+    assert about["session"] == 2
+    assert about["process_was_last_in"]
+    assert about["not_read"] == []
+    names = [each["event"] for each in events_of(archive)]
+    assert "trial.start" in names
+    assert "session.end" not in names
+    assert json.loads(file_of(archive, "session/timing.json"))["lateness_ms"]["most"] > 0
+
+
+@pytest.mark.parametrize(
+    ("text", "clean"),
+    [
+        (f"cannot write '/home/anna/{FOLDER}/data/QX417/QX417.h5'", "…/participant-1.h5"),
+        ("in /home/anna", "in …/user"),
+        ("in C:\\Users\\Anna B\\labor\\own.py, line 3", "in …/own.py, line 3"),
+        ("-I/home/anna/include", "…/user/include"),
+        ("on \\\\server\\share\\x.h5", "on …/x.h5"),
+        ("~/thesis/own.py:7", "…/own.py:7"),
+        ("port /dev/ttyUSB0 and/or 2 m/s", "port /dev/ttyUSB0 and/or 2 m/s"),
+        ("Linux-5.15.167.4-generic", "Linux-5.15.167.4-generic"),
+        ("data/QX417-SIMULATED/ses-01", "data/participant-1-SIMULATED/ses-01"),
+        ("QX4177 is another one", "QX4177 is another one"),
+        ("labcrane/onion/qx417/ses-01", "labcrane/onion/participant-1/ses-01"),
+        (f"{USER}@{HOST.upper()}", "user@computer"),
+        ("page http://192.168.1.4:8080/?key=1", "page (an address)"),
+        ("10.0.0.7 or fe80::1:2", "(an address) or (an address)"),
+        ("sent to 10.0.0.7.", "sent to (an address)."),
+        ("mail anna@example.org now", "mail (an e-mail address) now"),
+        ("at 12:30:45, 2026-11-27", "at 12:30:45, 2026-11-27"),
+    ],
+)
+def test_a_text_is_cleaned_of_people_computers_and_folders(
+    here: Path, text: str, clean: str
+) -> None:
+    cleaned = Cleaner([PERSON], [], [here / "data"]).text(text)
+    assert cleaned.removeprefix("cannot write '").removesuffix("'").removeprefix("-I") == clean
+
+
+def test_without_a_terminal_nothing_is_written_unless_yes_is_said(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    archive = report(status=2)
+    assert "there is no terminal at which to ask; --yes writes it" in capsys.readouterr().err
+    assert not archive.exists()
+    report("--yes")
+    assert archive.stat().st_mode & 0o077 == 0
+    assert planted_in(archive) == []
+    assert "no joystick" in file_of(archive, "doctor.json")
+
+
+@pytest.mark.parametrize(("typed", "written"), [("n\n", False), ("y\n", True)])
+def test_at_a_terminal_each_file_is_shown_and_then_it_is_asked(
+    typed: str,
+    written: bool,  # noqa: FBT001 - a parameter of a test
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr("sys.stdin", Terminal(typed))
+    archive = report()
+    said = capsys.readouterr().out
+    assert "== README.txt, " in said
+    assert '"text": "no joystick"' in said
+    assert "no session: there is no journal below data" in said
+    assert ("nothing was written" in said) is not written
+    assert archive.exists() is written
+
+
+def test_a_long_file_is_shown_in_part_and_whole_when_it_is_asked_for(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    many = tuple(Event("input.lost", 6.0 + number, {"why": f"no {number}"}) for number in range(99))
+    a_journal(here / "data" / PERSON, events=many)
+    report("--yes")
+    said = capsys.readouterr().out
+    assert "... and 40 lines more; the same command with --show session/events.jsonl" in said
+    assert "no 98" not in said
+    report("--show", "session/events.jsonl")
+    assert "no 98" in capsys.readouterr().out
+    report("--show", "session/frames", status=2)
+    assert "the archive has README.txt" in capsys.readouterr().err
+
+
+def test_the_session_written_last_is_taken_unless_another_one_is_asked_for(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import os
+
+    for session, when in ((1, 3000), (2, 1000)):
+        os.utime(a_journal(here / "data" / PERSON, session), (when, when))
+    report("--show", "session/about.json")
+    assert json.loads(capsys.readouterr().out)["session"] == 1
+    report("--show", "session/about.json", "--session", 2, "--data", here / "data" / PERSON)
+    said = capsys.readouterr().out
+    assert json.loads(said)["session"] == 2
+    report("--yes", "--protocol", "protokol.yaml", status=2)
+    assert "protokol.yaml: there is no such file" in capsys.readouterr().err
+    report("--yes", "--session", 3, status=1)
+    assert "there is no journal of session 3 below data; there is 1, 2" in capsys.readouterr().err
+
+
+def test_only_named_events_go_in_and_only_their_named_fields(here: Path) -> None:
+    events = (
+        Event("order.note", 6.0, {"text": NOTE}),
+        Event("questionnaire.answer", 6.5, {"item": "q1", "value": 4}),
+        Event("trial.end", 7.0, {"trial": 1, "outcome": "success", "error": 0.1, "late_ticks": 2}),
+        Event("plugin.slow", 8.0, {"why": f"own.py of {USER}", "calls": 4}),
+    )
+    a_journal(here / "data" / PERSON, events=events)
+    archive = report("--yes")
+    assert planted_in(archive) == []
+    _, trial, slow = events_of(archive)
+    assert trial == {"s": 2.0, "tick": 0, "part": 1, "event": "trial.end", "trial": 1} | {
+        "late_ticks": 2
+    }
+    assert slow["why"] == "own.py of user"
+    counted = json.loads(file_of(archive, "session/about.json"))["events_counted"]
+    assert counted["questionnaire.answer"] == 1
+    assert "order.note" not in KEPT
+
+
+def test_a_study_that_cannot_be_read_is_reported_with_the_reason(here: Path) -> None:
+    protocol = a_protocol(here)
+    protocol.write_text(protocol.read_text().replace("rate_hz", "rat_hz"), encoding="utf-8")
+    archive = report("--protocol", here, "--yes")
+    (why,) = json.loads(file_of(archive, "doctor.json"))["study_not_read"]
+    assert "'rat_hz' is not a key of the file" in why
+    assert planted_in(archive) == []
+
+
+def test_a_journal_that_cannot_be_read_is_reported_with_the_fault(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(paths: object) -> None:
+        raise ZeroDivisionError(f"in {paths}")
+
+    a_journal(here / "data" / PERSON)
+    monkeypatch.setattr("labcrane.cli.problem_report.read_journal", fails)
+    archive = report("--yes")
+    (fault,) = json.loads(file_of(archive, "session/about.json"))["not_read"]
+    assert "ZeroDivisionError" in fault
+    assert planted_in(archive) == []
+
+
+def test_a_file_that_is_there_is_not_overwritten(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("report.zip").write_text("kept", encoding="utf-8")
+    report("--yes", status=1)
+    assert "report.zip is there already; give another name with --to" in capsys.readouterr().err
+    assert Path("report.zip").read_text() == "kept"
