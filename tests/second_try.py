@@ -8,6 +8,7 @@ or more than ``MOST`` that fail once, is red. ``pytest`` by itself gives no seco
 
 import json
 import os
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -22,6 +23,14 @@ PASSED = "LABCRANE_PASSED"
 
 QUICK = "not slow and not long and not soak"
 """What ``pytest`` runs without a word; pyproject.toml says so too."""
+
+GROUPS = {
+    QUICK: "quick tests",
+    "not long and not soak": "quick and slow tests",
+    "long": "long tests",
+    "soak": "soak tests",
+}
+"""What the tests are called that the stages of a gate choose by their marks."""
 
 MOST = 3
 """How many tests of one gate may need a second try."""
@@ -65,6 +74,7 @@ class SecondTry:
         self._path = path
         self._passed = passed
         self._ended: set[str] = set()
+        self._what = chosen(config)
         self._failed: dict[str, None] = {}
         self._counts = {"passed": 0, "failed": 0, "skipped": 0}
         self._seconds: dict[str, float] = {}
@@ -113,6 +123,9 @@ class SecondTry:
     def _note(self, status: int) -> None:
         line = {
             "status": status,
+            "system": platform.system(),
+            "python": platform.python_version(),
+            "what": self._what,
             **self._counts,
             "second_try": self._again,
             "processor_s": round(_processor_s()),
@@ -139,6 +152,14 @@ class SecondTry:
         terminalreporter.line(f"{used:.0f} s of processor{more}")
         for says in self._says:
             terminalreporter.line(says)
+
+
+def chosen(config: pytest.Config) -> str:
+    """Return in words which tests are run."""
+    marks = config.getoption("markexpr")
+    group = GROUPS.get(marks, f"tests that are {marks}" if marks else "all tests")
+    places = config.getoption("file_or_dir")
+    return f"{group} of {', '.join(places)}" if places else group
 
 
 def _passes(names: list[str], root: Path) -> bool:

@@ -1,0 +1,131 @@
+"""Pages say of systems and wheels what the record of the stages says, and nothing else."""
+
+import json
+import re
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+from docs.page import ROOT
+
+
+def load() -> ModuleType:
+    loader = SourceFileLoader("evidence", str(ROOT / ".ci" / "evidence"))
+    spec = spec_from_loader("evidence", loader)
+    assert spec
+    module = module_from_spec(spec)
+    loader.exec_module(module)
+    return module
+
+
+EVIDENCE = load()
+RECORD = json.loads((ROOT / EVIDENCE.DATA).read_text(encoding="utf-8"))
+NOTHING: dict[str, Any] = {
+    "stages": {},
+    "systems": [],
+    "wheels": {"date": "2026-11-22", "commit": "abc", "found": []},
+}
+RUN = {
+    "status": 0, "system": "Linux", "python": "3.14.1", "what": "quick tests", "passed": 7,
+    "failed": 0, "skipped": 2, "second_try": [], "processor_s": 5,
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def in_the_repository(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+
+
+def rows(table: str, system: str) -> list[list[str]]:
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()]
+    return [row[1:] for row in cells if row and row[0] == system]
+
+
+def after(folder: Path, stage: str, *runs: dict[str, Any], ending: str = "passed") -> Any:
+    path = folder / "runs"
+    path.write_text("".join(json.dumps(run) + "\n" for run in runs), encoding="utf-8")
+    return EVIDENCE.kept(NOTHING, stage, ending, "12", path)
+
+
+def test_the_pages_are_those_of_the_record() -> None:
+    compatibility = EVIDENCE.COMPATIBILITY.read_text(encoding="utf-8")
+    for page, text in EVIDENCE.pages(RECORD, compatibility).items():
+        assert page.read_text(encoding="utf-8") == text, "run .ci/evidence"
+
+
+def test_a_system_without_a_run_is_said_to_have_none() -> None:
+    table = EVIDENCE.systems_table(NOTHING)
+    for system in ("Linux", "Windows under Wine", "Windows", "macOS"):
+        assert {row[3] for row in rows(table, system)} == {"no run recorded"}
+    assert [row[0] for row in rows(table, "Linux")] == ["3.11", "3.12", "3.13", "3.14"]
+
+
+def test_a_stage_is_kept_for_each_system_and_python_that_it_ran_on(tmp_path: Path) -> None:
+    demo = RUN | {"what": "labcrane demo", "passed": 0, "skipped": 0}
+    broken = RUN | {"python": "3.12.3", "status": 1, "failed": 3}
+    record = after(tmp_path, "pythons", demo, RUN, broken, ending="failed")
+    table = EVIDENCE.systems_table(record)
+    by_python = {row[0]: row[1:] for row in rows(table, "Linux")}
+    assert by_python["3.14"][:6] == [
+        "pythons", "labcrane demo; quick tests", "passed", "7", "0", "2",
+    ]  # fmt: skip
+    assert by_python["3.12"][2:6] == ["failed", "7", "3", "2"]
+    assert by_python["3.11"][2] == "no run recorded"
+    assert record["stages"]["pythons"]["ended"] == "failed"
+    assert record["stages"]["pythons"]["passed"] == 14
+    assert re.fullmatch(r"[0-9a-f]{7,}", by_python["3.14"][-1])
+
+
+def test_a_run_on_any_python_of_a_system_replaces_the_row_that_says_there_was_none(
+    tmp_path: Path,
+) -> None:
+    table = EVIDENCE.systems_table(after(tmp_path, "full", RUN | {"system": "Darwin"}))
+    assert [row[:2] for row in rows(table, "macOS")] == [["3.14", "full"]]
+
+
+def test_a_newer_run_of_a_stage_takes_the_place_of_the_older_one(tmp_path: Path) -> None:
+    old = after(tmp_path, "pythons", RUN, RUN | {"python": "3.12.1"})
+    (tmp_path / "runs").write_text(json.dumps(RUN | {"passed": 9}) + "\n", encoding="utf-8")
+    new = EVIDENCE.kept(old, "pythons", "passed", "1", tmp_path / "runs")
+    assert [(one["python"], one["passed"]) for one in new["systems"]] == [("3.12", 7), ("3.14", 9)]
+
+
+@pytest.mark.parametrize(
+    ("said", "counts"),
+    [
+        ("== 3 passed, 1 failed in 2.00s ==\n1 passed, 2 skipped in 61.5s (0:01:01)\n", (4, 1, 2)),
+        ("2 failed, 1 error in 1.1s", (0, 3, 0)),
+        ("what was recorded: 3 passed by", (0, 0, 0)),
+    ],
+)
+def test_tests_are_counted_in_what_a_command_says(said: str, counts: tuple[int, ...]) -> None:
+    run = EVIDENCE.noted("Windows under Wine", "3.11", "a study day", "1", said)
+    assert (run["passed"], run["failed"], run["skipped"]) == counts
+    assert run["status"] == 1
+
+
+def test_wheels_that_are_not_there_are_named(tmp_path: Path) -> None:
+    found = [
+        {
+            "platform": name,
+            "python": "3.14",
+            "set": "lab",
+            "resolved": name != "aarch64-apple-darwin",
+            "without": ["pyo"] if "windows" in name else [],
+        }
+        for name in EVIDENCE.PLATFORMS
+    ]
+    (tmp_path / "runs.wheels").write_text("".join(json.dumps(one) + "\n" for one in found))
+    table = EVIDENCE.wheels_table(after(tmp_path, "wheels"))
+    assert "| lab | 3.14 | all | all but pyo | **not resolved** | all |" in table
+    assert "| all | 3.14 | not tried | not tried | not tried | not tried |" in table
+
+
+def test_every_stage_of_the_nightly_run_has_a_row() -> None:
+    nightly = (ROOT / ".ci" / "nightly").read_text(encoding="utf-8")
+    known = re.search(r'^known="(.+?)" of_gate="(.+?)"$', nightly, re.M)
+    assert known
+    assert [*known[1].split(), *known[2].split()] == list(EVIDENCE.STAGES)
