@@ -1,7 +1,7 @@
 """Results: cohort, movements, measures and the performance indicator.
 
-In come participant files; out go tables with one row per movement, and what they say. Nothing here
-is needed while people are recorded; what is heavy is imported when it is used.
+Input: participant files. Output: tables with one row per movement, and their statistics. Nothing
+here is needed while people are recorded; large libraries are imported when they are used.
 """
 
 import lazy_loader

@@ -22,23 +22,23 @@ WORDS = {
     "awareness": "felt awareness: practise looking around, with more cameras",
 }
 FEWEST = 4
-"""Runs of a scenario below which nothing is said of it."""
+"""Fewest runs of a scenario that are judged."""
 
 STEADY = 0.1
-"""Spread of the last three times, as a share of their mean, at which an operator is at home."""
+"""Spread of the last three times, as a share of their mean, at which performance is stable."""
 
 FALL = 5.0
 """Percentage points by which the last three runs are below the best three: fatigue."""
 
 FELT = 0.1
-"""How much a rating, 0 to 1, must have fallen for an operator not to be at home after all."""
+"""Fall of a rating, 0 to 1, from which performance is not yet stable."""
 
 WINDOW = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """One thing to be said, and what it rests on."""
+    """One piece of advice, and its evidence."""
 
     operator: str
     about: str
@@ -47,7 +47,7 @@ class Advice:
 
 
 def suggest(tests: Sequence[OperatorTest]) -> Advice:
-    """Return what one operator should practise next: the component that loses most points."""
+    """Return the recommended practice of one operator: the component that loses most points."""
     lost: dict[str, float] = {}
     for test in tests:
         for name, points in test.indicator.points.items():
@@ -67,7 +67,7 @@ def suggest(tests: Sequence[OperatorTest]) -> Advice:
 
 
 def familiarity(tests: Sequence[OperatorTest], *, across: bool = False) -> Advice:
-    """Return whether an operator is at home: times are steady, below the first, and felt no worse.
+    """Return whether an operator's times are stable, below the first, and ratings not worse.
 
     Parameters
     ----------
@@ -98,9 +98,9 @@ def familiarity(tests: Sequence[OperatorTest], *, across: bool = False) -> Advic
 
 
 def fatigue(tests: Sequence[OperatorTest], *, across: bool = False) -> Advice:
-    """Return whether a scenario is worn out: runs have become worse again after the best ones.
+    """Return whether there is scenario fatigue: runs became worse again after the best ones.
 
-    The indicator that they are compared by holds times, relative to the reference, and ratings.
+    They are compared by the indicator, which includes ratings, and times relative to the reference.
 
     Parameters
     ----------

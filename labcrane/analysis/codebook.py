@@ -1,4 +1,4 @@
-"""Every column of a participant's tables, with its unit and where it comes from."""
+"""Every column of a participant's tables, with its unit and its source."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 IDENTITY = {
-    "participant": "pseudonym, with PILOT or SIMULATED where it is one",
+    "participant": "pseudonym, with PILOT or SIMULATED if it applies",
     "status": "complete, half-finished, pilot or simulated",
     "session": "number of the session, from 1",
     "session_name": "the protocol's name of the session",
@@ -26,11 +26,11 @@ EVENTS: Mapping[str, tuple[str, str]] = {
     "session": ("1", "number of the session"),
     "time": ("s", "when it happened, on the session's clock"),
     "tick": ("1", "tick in which it happened"),
-    "part": ("1", "piece of the session, which grows with each interruption"),
-    "trial": ("1", "number of the trial it is of; 0 outside of one"),
+    "part": ("1", "segment of the session; increases with each interruption"),
+    "trial": ("1", "number of its trial; 0 outside trials"),
     "name": ("", "what happened"),
-    "label": ("", "plain name with block and condition, to epoch by"),
-    "data": ("", "what is known of it, as JSON"),
+    "label": ("", "plain name with block and condition, for epochs"),
+    "data": ("", "its data, as JSON"),
 }
 """Unit and meaning of the columns of the table of events."""
 
@@ -60,7 +60,7 @@ def trial_codebook(
     Parameters
     ----------
     sessions
-        Sessions whose questionnaires may be columns beside the trials.
+        Sessions whose questionnaires may be columns of the trial table.
     """
     import pandas as pd
 
@@ -86,7 +86,7 @@ def trial_codebook(
 
 
 def event_codebook() -> "pd.DataFrame":
-    """Return the same of the table of events."""
+    """Return the same for the table of events."""
     import pandas as pd
 
     rows = [("events", name, *about, WRITTEN) for name, about in EVENTS.items()]
@@ -94,7 +94,7 @@ def event_codebook() -> "pd.DataFrame":
 
 
 def fixation_codebook() -> "pd.DataFrame":
-    """Return the same of the table of points at which the eye tracker was checked."""
+    """Return the same for the table of fixation points of the eye tracker's checks."""
     import pandas as pd
 
     who = {name: ("", IDENTITY[name]) for name in ("participant", "session")}
@@ -103,7 +103,7 @@ def fixation_codebook() -> "pd.DataFrame":
 
 
 def _asked(sessions: Sequence[SessionRecord]) -> dict[str, str]:
-    """Return what each column of an answer or a score beside the trials means."""
+    """Return the meaning of each column of an answer or a score in the trial table."""
     meanings: dict[str, str] = {}
     for session in sessions:
         for name, about in asked_in(session).items():
@@ -118,7 +118,7 @@ def _asked(sessions: Sequence[SessionRecord]) -> dict[str, str]:
 
 
 def questionnaire_codebook(sessions: Sequence[SessionRecord]) -> "pd.DataFrame":
-    """Return the same of the tables of answers and scores, and of every question and score."""
+    """Return the same for the tables of answers and scores, and for every item and score."""
     import pandas as pd
 
     rows = [
@@ -146,7 +146,7 @@ def questionnaire_codebook(sessions: Sequence[SessionRecord]) -> "pd.DataFrame":
 
 
 def stream_codebook(session: SessionRecord) -> "pd.DataFrame":
-    """Return the same of a session's streams; the table is the stream."""
+    """Return the same for a session's streams; the table is the stream."""
     import pandas as pd
 
     rows, told = [], {f"loop.{each.name}": each.definition for each in LOOP}

@@ -1,4 +1,4 @@
-"""Cohort of a data folder: who is in it, and who counts."""
+"""Cohort of a data folder: its participants, and who is included."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 
 class Status(StrEnum):
-    """What a participant's data are. The order is that of the rules: the first that holds."""
+    """Status of a participant's data, in the order of the rules: the first that applies."""
 
-    ERASED = "erased"  # only a tombstone is left in the register; cannot be included
+    ERASED = "erased"  # only an erasure record is left in the register; cannot be included
     EXCLUDED = "excluded"  # in the register, with a reason; cannot be included
     UNREADABLE = "unreadable"  # no participant file, or a damaged one; cannot be included
     SIMULATED = "simulated"
@@ -29,15 +29,15 @@ class Status(StrEnum):
 
 
 Struck = tuple[Status, str]
-"""Whether somebody was erased or excluded, and why."""
+"""Whether a participant was erased or excluded, and why."""
 
 INCLUDABLE = (Status.SIMULATED, Status.PILOT, Status.HALF_FINISHED)
-"""What is left out unless it is asked for."""
+"""Statuses that are left out unless they are requested."""
 
 
 @dataclass(frozen=True)
 class Participant:
-    """One participant of a study, with what was recorded.
+    """One participant of a study, with the recordings.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Participant:
     path
         The participant file.
     status
-        What the data are.
+        Status of the data.
     why
         The reason for the status, in words.
     """
@@ -58,12 +58,12 @@ class Participant:
 
     @property
     def recording(self) -> Recording:
-        """The participant file; each call reads it anew, so that nothing piles up in memory."""
+        """The participant file; each access reads it again, so that memory does not fill up."""
         return open_recording(self.path)
 
     @cached_property
     def context(self) -> dict[str, Any]:
-        """What was known when the first session started."""
+        """Facts known when the first session started."""
         recording = self.recording
         return recording.session((self.usable or recording.sessions)[0]).context
 
@@ -75,7 +75,7 @@ class Participant:
 
     @cached_property
     def usable(self) -> tuple[int, ...]:
-        """Numbers of the sessions that hold something: one may have ended before its first tick."""
+        """Numbers of the sessions that contain data: one may have ended before its first tick."""
         recording = self.recording
         return tuple(
             number
@@ -86,14 +86,14 @@ class Participant:
 
 @dataclass(frozen=True, slots=True)
 class Cohort:
-    """The participants of a data folder, by what becomes of them.
+    """The participants of a data folder, included or left out.
 
     Attributes
     ----------
     included
-        Whose data are used.
+        Those whose data are used.
     left_out
-        Whose are not; their ``status`` and ``why`` say the reason.
+        The others; their ``status`` and ``why`` give the reason.
     """
 
     folder: Path
@@ -101,12 +101,12 @@ class Cohort:
     left_out: tuple[Participant, ...]
 
     def without(self, name: str, why: str) -> "Cohort":
-        """Return the cohort without somebody whose data turned out not to be readable.
+        """Return the cohort without a participant whose data could not be read.
 
         Raises
         ------
         RecordingError
-            Nobody else is left to be used.
+            No other usable participant is left.
         """
         gone = [
             replace(person, status=Status.UNREADABLE, why=why)
@@ -121,11 +121,11 @@ class Cohort:
 
     @property
     def unreadable(self) -> tuple[Participant, ...]:
-        """Who is left out because of a recording that cannot be used."""
+        """Participants left out because their recordings cannot be used."""
         return tuple(person for person in self.left_out if person.status is Status.UNREADABLE)
 
     def listing(self) -> "pd.DataFrame":
-        """Return everybody with status and reason: what must stand beside every average."""
+        """Return all participants with status and reason, to be shown with every average."""
         import pandas as pd
 
         rows = [
@@ -144,7 +144,7 @@ def find_cohort(
     include: Iterable[str] = (),
     struck: Mapping[str, Struck] | None = None,
 ) -> Cohort:
-    """Look at every participant below ``folder``.
+    """Find every participant below ``folder``.
 
     Complete participants are included. Others only when their status is named in ``include``.
 
@@ -153,16 +153,16 @@ def find_cohort(
     folder
         The study's data folder.
     include
-        Of simulated, pilot and half-finished, those to be used as well.
+        Statuses to be used as well: simulated, pilot, half-finished.
     struck
-        Whom the register says not to count, and why, by name: they are listed, never used.
+        Participants whom the register excludes, and why, by name: they are listed, never used.
 
     Raises
     ------
     ProtocolError
         ``include`` names something else.
     RecordingError
-        There is no such folder, or nobody is left to be used.
+        There is no such folder, or no usable participant is left.
     """
     wanted = {Status.COMPLETE, *(_includable(word) for word in include)}
     people = everyone(folder, struck)
@@ -174,7 +174,7 @@ def find_cohort(
 
 
 def everyone(folder: Path, struck: Mapping[str, Struck] | None = None) -> list[Participant]:
-    """Return whoever has data below ``folder`` or was struck, in the order of their names.
+    """Return all who have data below ``folder`` or were struck, sorted by name.
 
     Raises
     ------
@@ -204,8 +204,8 @@ def _includable(word: str) -> Status:
 def _nobody(folder: Path, left_out: Sequence[Participant]) -> str:
     if not left_out and (path := participant_path(folder)).exists():
         return (
-            f"{folder} is not a study's data folder but holds one recording, {path.name}; give the "
-            "folder above it, or read what was recorded without a study with "
+            f"{folder} is not a study's data folder but contains one recording, {path.name}; give "
+            "the folder above it, or read what was recorded without a study with "
             "labcrane.open_recording, or its ses-*_streams.xdf with any reader of XDF"
         )
     if not left_out:
@@ -216,7 +216,7 @@ def _nobody(folder: Path, left_out: Sequence[Participant]) -> str:
     asked = [f"--include {status}" for status in INCLUDABLE if counts[str(status)]]
     if asked:
         remedies.append(f"to use them as well: {' '.join(asked)}")
-    return "; ".join([f"nobody in {folder} can be used as asked: {found}", *remedies])
+    return "; ".join([f"no usable participant in {folder}: {found}", *remedies])
 
 
 def _is_participant(entry: Path) -> bool:
@@ -243,16 +243,16 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
 
 
 def _hollow(number: int, session: SessionRecord) -> str | None:
-    """Return why a session holds nothing that could be used; None when it holds something."""
+    """Return why a session contains no usable data; None if it does."""
     if not session.context:
-        return f"session {number} does not say what it is: the program was killed at its start"
+        return f"session {number} has no metadata: the program was killed at its start"
     if "state" not in session.streams or not len(session.streams["state"].time):
-        return f"session {number} holds no frames: it ended before its first tick"
+        return f"session {number} contains no frames: it ended before its first tick"
     return None
 
 
 def kinds_of(participants: Iterable[Participant]) -> str:
-    """Return ``SIMULATED and PILOT``, as far as there are any; nothing where all are people's."""
+    """Return ``SIMULATED and PILOT``, as far as there are any; empty if all are real recordings."""
     found = {participant.status for participant in participants}
     named = [str(kind).upper() for kind in (Status.SIMULATED, Status.PILOT) if kind in found]
     return " and ".join(named)

@@ -1,10 +1,10 @@
-"""Gaze measures, from a stream of others that says where the operator looked.
+"""Gaze measures, from an external stream of the operator's gaze.
 
 A gaze stream is a stream of LSL type ``Gaze`` with a channel labelled ``aoi``: for each sample the
 name of the area of interest that is looked at, or its number from 1; an empty text or 0 for none,
-NaN for a blink. A source that knows only where in the window it is looked at, in pixels, is joined
+NaN for a blink. A source that has only the gaze position in the window, in pixels, is joined
 to the areas that a view recorded with its pictures (``labcrane.feedback.NAME.areas``):
-:func:`looks_on_screen`. Which stream is measured, :mod:`~labcrane.analysis.gaze_streams` says.
+:func:`looks_on_screen`. :mod:`~labcrane.analysis.gaze_streams` selects the stream.
 """
 
 import math
@@ -37,7 +37,7 @@ ROUNDING_S = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Looks:
-    """What was looked at, sample by sample.
+    """The area that was looked at, sample by sample.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Looks:
     area
         The area's name; "" for none.
     tracked
-        Whether it is known where somebody looked: not in a blink, nor where tracking was lost.
+        Whether the gaze position is known: not in a blink, nor where tracking was lost.
     areas
         Names of all areas that there were, looked at or not, as far as they are known.
     """
@@ -59,8 +59,8 @@ class Looks:
     def dwell(self, area: str, start: float, stop: float) -> float:
         """Return for how long ``area`` was looked at from ``start`` to ``stop``, in seconds.
 
-        A sample holds until the next one, at most for twice the usual step: a gap is no look. NaN
-        where no sample says where somebody looked.
+        A sample holds until the next one, at most for twice the usual step: a gap is not a look.
+        NaN where no sample has a gaze position.
         """
         held = self._held(start, stop)
         if not held[self.tracked].any():
@@ -68,7 +68,7 @@ class Looks:
         return float(held[np.array([name == area for name in self.area], bool)].sum())
 
     def valid(self, start: float, stop: float) -> float:
-        """Return for which share of the time from ``start`` to ``stop`` it is known, 0 to 1.
+        """Return the share of the time from ``start`` to ``stop`` with known gaze, 0 to 1.
 
         NaN where there is no time.
         """
@@ -105,14 +105,14 @@ class Looks:
 
 
 def looks(session: SessionRecord, delay_s: float = 0.0, stream: str = "") -> Looks | None:
-    """Return what a session's gaze stream says, or None when it has none that can be measured.
+    """Return a session's gaze, or None without a stream that can be measured.
 
     Parameters
     ----------
     session
         A recorded session.
     delay_s
-        Of the display, for a stream that says where in the window it is looked at: as in
+        Of the display, for a stream of positions in the window: as in
         :func:`looks_on_screen`. With 0, a picture is seen as soon as it is handed to the screen.
     stream
         Name of the gaze stream; the only one by default.
@@ -153,7 +153,7 @@ def area_columns(pictures: Stream) -> dict[str, tuple[str, ...]]:
 
 
 def _things(areas: Sequence[str]) -> dict[str, str]:
-    """Return what each area is called in a table: by its thing, with the camera if it has two."""
+    """Return the name of each area in a table: its object, with the camera if it has two."""
     things = [name.partition(".")[2] for name in areas]
     alone = len(set(things)) == len(things)
     return {
@@ -169,7 +169,7 @@ def looks_on_screen(
     areas: Mapping[str, FloatArray],
     delay_s: float,
 ) -> Looks:
-    """Return which area was looked at in the picture that was on the glass at that moment.
+    """Return the area that was looked at in the picture that was on the screen at that moment.
 
     A picture handed to the screen at ``shown`` is seen from ``shown + delay_s`` on, until the next
     one is; its areas are where the objects were in it, however far they have moved since.
@@ -179,7 +179,7 @@ def looks_on_screen(
     time
         Of the gaze samples, on our clock, in seconds, shape ``(n,)``.
     gaze
-        Where in the window it is looked at, in pixels, x and y from the upper left corner, shape
+        Gaze positions in the window, in pixels, x and y from the upper left corner, shape
         ``(n, 2)``; NaN for a blink.
     shown
         ``flip.time`` of the view's pictures, in seconds, rising, shape ``(m,)``.
@@ -196,7 +196,7 @@ def looks_on_screen(
     """
     if not math.isfinite(delay_s):
         raise ValueError(
-            "the display's delay is not known, so nobody knows which picture was looked at; "
+            "the display's delay is unknown, so gaze cannot be matched to pictures; "
             "measure it with labcrane doctor --display"
         )
     if gaze.shape != (len(time), 2):
@@ -225,13 +225,13 @@ def looks_on_screen(
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """How far from a fixation target somebody seemed to look at it.
+    """Offset of the measured gaze from a fixation target.
 
     Attributes
     ----------
     right_deg, down_deg
         The median offset, in degrees of visual angle: its parts to the right and downwards, as seen
-        by whoever looks straight at the target.
+        by a person who looks straight at the target.
     spread_deg
         Median distance of the samples from that, in degrees: the precision.
     """
@@ -276,9 +276,7 @@ def drift(
     """
     there = gaze[np.isfinite(gaze).all(axis=1)]
     if not len(there):
-        raise ValueError(
-            "no gaze sample was valid while the target was to be looked at; calibrate again"
-        )
+        raise ValueError("no gaze sample was valid during fixation of the target; calibrate again")
     metres = (np.vstack([there, target]) - centre) / px_per_m
     rays = np.column_stack([metres, np.full(len(metres), viewing_m)])
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
@@ -298,7 +296,7 @@ def drift(
 
 FIXATIONS: Mapping[str, tuple[str, str]] = {
     "step": ("1", "number of the step that checked the eye tracker"),
-    "point": ("1", "number of the point that was to be looked at"),
+    "point": ("1", "number of the fixation point"),
     "time": ("s", "when the point appeared, on the session's clock"),
     "right_deg": ("deg", "median offset of gaze from the point, to the right"),
     "down_deg": ("deg", "median offset of gaze from the point, downwards"),
@@ -316,18 +314,18 @@ SETTLED_S = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Glass:
-    """The operator's picture, as its view told when it was ready.
+    """The operator's picture, as its view reported when it was ready.
 
     Attributes
     ----------
     size
         Width and height, in pixels.
     flip
-        How the window shows it turned over: ``none``, ``horizontal`` or ``vertical``.
+        Mirroring by the window: ``none``, ``horizontal`` or ``vertical``.
     px_per_m, viewing_m
-        Pixels in a metre of it, and the eye's distance in metres; NaN where nobody said.
+        Pixels in a metre of it, and the eye's distance in metres; NaN where not given.
     refresh_hz
-        How often the monitor shows a picture, in Hz; NaN where nobody knew.
+        Refresh rate of the monitor, in Hz; NaN where unknown.
     """
 
     size: tuple[int, int]
@@ -348,17 +346,17 @@ def fixations(session: SessionRecord, settled_s: float = SETTLED_S) -> "pd.DataF
 
     One row for each point that was shown for its whole time: ``step`` and ``point``, counted from
     1; ``time`` on our clock, in seconds; ``right_deg``, ``down_deg``, ``deg`` and ``spread_deg`` as
-    in :class:`Drift`, NaN where nobody said how large the picture is, or how far the eye;
+    in :class:`Drift`, NaN where the picture's size or the eye's distance was not given;
     ``right_px`` and ``down_px``, the median offset in pixels; ``valid``, the share of samples that
-    are numbers. No row without an operator's view, or without one gaze stream alone that says where
-    in the window somebody looks, in pixels.
+    are numbers. No row without an operator's view, or without exactly one gaze stream in
+    pixels of the window.
 
     Parameters
     ----------
     session
         A recorded session.
     settled_s
-        What is left out after a point appears, in seconds: the eye's way to it.
+        Time that is left out after a point appears, in seconds: the eye moves to it.
     """
     import pandas as pd
 
@@ -407,7 +405,7 @@ def _shown(session: SessionRecord) -> Iterator[ShownPoint]:
 
 
 def fixations_of(participant: Participant) -> "pd.DataFrame":
-    """Return :func:`fixations` of all sessions, each row with whose and of which it is."""
+    """Return :func:`fixations` of all sessions, each row with its participant and session."""
     import pandas as pd
 
     tables = [
@@ -428,7 +426,7 @@ def glass_of(session: SessionRecord) -> Glass | None:
 
 
 def _glass(facts: str) -> Glass | None:
-    """Return the picture that facts of a view are about; None where it is not the operator's."""
+    """Return the picture that a view's facts describe; None if it is not the operator's."""
     names = "seen_by|size|flip|px_per_m|viewing_m|refresh_hz(?! not known)"
     told = dict(re.findall(rf"(?:^|, )({names}) (\w[\w.+-]*)", facts))
     size = re.fullmatch(r"(\d+)x(\d+)", told.get("size", ""))
@@ -467,7 +465,7 @@ def area_name(value: object) -> str:
 
 
 def _is_lost(value: object) -> bool:
-    """Return whether a sample of ``aoi`` says that nobody knows; a text always knows."""
+    """Return whether a sample of ``aoi`` says that the area is unknown; a text never does."""
     return not isinstance(value, str) and math.isnan(float(str(value)))
 
 
@@ -478,7 +476,7 @@ def gaze_measures(
     """Return how much of gaze is known, and dwell and first look for each area.
 
     ``gaze_valid_before`` and ``gaze_valid_during`` are the shares of the time from the trial's
-    start to onset and from onset to offset in which it is known where somebody looked.
+    start to onset and from onset to offset in which the gaze position is known.
     ``dwell_before_X`` and ``dwell_during_X`` are the seconds in which that was X: 0 where it was
     not, NaN where that share is 0. ``look_lead_X`` is the time from the first look at X in the
     trial to the movement's onset, in seconds, NaN when X was not looked at before it.
@@ -488,10 +486,10 @@ def gaze_measures(
     started, onset, offset
         Of trial and movement, on our clock, in seconds.
     look_least_s
-        How long a first look lasts at least, in seconds: less is no fixation.
+        Minimum duration of a first look, in seconds: a shorter one is not a fixation.
     pauses
-        When the trial was paused and when it went on, on our clock, in seconds, rising. They are no
-        part of any time, as they are of no other measure.
+        When the trial was paused and when it went on, on our clock, in seconds, rising. They are
+        excluded from all times, as from all other measures.
     """
     parts = {
         "before": _between(pauses, started, onset),
@@ -541,8 +539,8 @@ def _lead(seen: Looks, area: str, pieces: Pieces, least_s: float) -> float:
 def with_unseen_areas(movements: "pd.DataFrame") -> "pd.DataFrame":
     """Return movements of several recordings with 0 s for areas that only others looked at.
 
-    A stream that names what is looked at does not say what else there was: an area has a column in
-    the tables of those who looked at it. Where tracking was lost it stays NaN.
+    A stream of area names does not list other areas: an area has a column in the tables of those
+    who looked at it. Where tracking was lost it stays NaN.
     """
     filled = {}
     for part in ("before", "during"):
@@ -559,7 +557,7 @@ def gaze_units(columns: "pd.Index[str]") -> dict[str, tuple[str, str]]:
     found = {}
     for name in columns:
         if name.startswith("gaze_valid_"):
-            found[name] = ("1", "share of the time in which it is known where somebody looked")
+            found[name] = ("1", "share of the time in which the gaze position is known")
         elif name.startswith("dwell_"):
             found[name] = ("s", "gaze on an area of interest; NaN where tracking was lost")
         elif name.startswith("look_lead_"):

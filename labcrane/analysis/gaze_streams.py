@@ -2,7 +2,7 @@
 
 A stream of LSL type ``Gaze`` is measured where a channel ``aoi`` names what is looked at, or where
 two channels in pixels say where in the participant's window. Pixels of a head-mounted tracker's
-scene camera look the same, so they are taken for the window's only where somebody says so: the
+scene camera look the same, so they are taken for the window's only where that is declared: in the
 protocol (``space``), ``labcrane resync --space``, or ``coordinate_system`` in the stream's header.
 They are joined to the areas of the one view that the operator sees (:func:`window_pictures`).
 """
@@ -33,17 +33,17 @@ UNMEASURED = ("participant", "session", "stream", "why")
 def gaze_stream(session: SessionRecord, name: str = "") -> Stream | None:
     """Return the stream by which gaze is measured: one that names areas, else one in the window.
 
-    None where there is none, or where several would do: :func:`unmeasured` says which.
+    None without one, or if several are usable: :func:`unmeasured` lists them.
 
     Parameters
     ----------
     name
-        Of the one that is meant; empty for the only one.
+        Name of the stream; empty for the only one.
 
     Raises
     ------
     RecordingError
-        Nothing can be measured by the stream of that name.
+        The stream of that name cannot be measured.
     """
     found = [each for each in _candidates(session) if name in ("", each.name)]
     if name and not found:
@@ -53,33 +53,33 @@ def gaze_stream(session: SessionRecord, name: str = "") -> Stream | None:
 
 
 def window_stream(session: SessionRecord, name: str = "") -> Stream | None:
-    """Return the stream that says where in the window somebody looks; None for none or several."""
+    """Return the gaze stream in pixels of the window; None for none or several."""
     found = [each for each in _gaze(session) if place(each) and name in ("", each.name)]
     return found[0] if len(found) == 1 else None
 
 
 def place(gaze: Stream) -> tuple[str, ...]:
-    """Return the columns of a place in the window, x and y in pixels; nothing where none are.
+    """Return the columns of a place in the window, x and y in pixels; empty without them.
 
-    Nothing either where nobody says that its pixels are the window's.
+    Empty also if it is not stated that its pixels are the window's.
     """
     columns = _in_pixels(gaze)
     return columns if columns and gaze_space(gaze) == SCREEN else ()
 
 
 def window_pictures(session: SessionRecord) -> Stream | None:
-    """Return where things were in the pictures of the operator's window; None for none or several.
+    """Return the areas in the pictures of the operator's window; None for none or several.
 
-    An examiner's view records its areas as well, and nobody's gaze is in its pixels.
+    The experimenter's view records its areas as well, but no gaze is in its pixels.
     """
     found = _pictures(session)
     return found[0] if len(found) == 1 else None
 
 
 def gaze_space(gaze: Stream) -> str:
-    """Return what a stream's places are in: ``screen``, ``scene``, or nothing where nobody says.
+    """Return the space of a stream's positions: ``screen``, ``scene``, or empty if not stated.
 
-    What was declared counts before what the header states.
+    A declaration takes precedence over the header.
     """
     if declared := gaze.attrs.get("space"):
         return str(declared)
@@ -93,7 +93,7 @@ def gaze_space(gaze: Stream) -> str:
 
 
 def unmeasured(session: SessionRecord) -> list[tuple[str, str]]:
-    """Return the gaze streams by which nothing is measured, each with the reason and a way out."""
+    """Return the gaze streams that are not measured, each with the reason and a remedy."""
     found = []
     for each in _gaze(session):
         if CHANNEL in each.units or not _in_pixels(each) or place(each):
@@ -105,9 +105,9 @@ def unmeasured(session: SessionRecord) -> list[tuple[str, str]]:
             )
         else:
             why = (
-                "is in pixels, and neither the protocol nor its header says of what; if they are "
-                "the participant's window's, declare it with labcrane resync FILE --space "
-                f"'{each.name}=screen', else '{each.name}=scene'"
+                "is in pixels, but neither the protocol nor its header states of which picture; "
+                "for the participant's window, declare it with labcrane resync FILE --space "
+                f"'{each.name}=screen'; for a scene camera, '{each.name}=scene'"
             )
         found.append((each.name, why))
     several = _candidates(session)
@@ -116,12 +116,12 @@ def unmeasured(session: SessionRecord) -> list[tuple[str, str]]:
     if by_place and len(pictures) > 1:
         views = " and ".join(map(repr, pictures))
         why = (
-            f"is in pixels of the window, and of the operator's views {views} nobody says which; "
-            "join it by hand with labcrane.analysis.gaze.looks_on_screen (docs/devices.md)"
+            f"is in pixels of the window, but it is unknown of which view ({views}); "
+            "join it manually with labcrane.analysis.gaze.looks_on_screen (docs/devices.md)"
         )
         return [*found, *((each.name, why) for each in by_place)]
     names = " and ".join(repr(each.name) for each in several)
-    why = f"could be measured as well as others: {names}; say which, by gaze_stream='NAME'"
+    why = f"could be measured as well as others: {names}; choose one: gaze_stream='NAME'"
     return [*found, *((each.name, f"{why} of MeasureSettings") for each in several[1:] and several)]
 
 
@@ -142,7 +142,7 @@ def _gaze(session: SessionRecord) -> list[Stream]:
 
 
 def _candidates(session: SessionRecord) -> Sequence[Stream]:
-    """Return the streams that could be measured; those that name areas know more than others."""
+    """Return the streams that could be measured; those that name areas are preferred."""
     named = [each for each in _gaze(session) if CHANNEL in each.units]
     return named or [each for each in _gaze(session) if place(each)]
 

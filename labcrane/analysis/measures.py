@@ -34,12 +34,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SHORTEST = 8
-"""Movements of fewer ticks are not measured: their spectrum says nothing."""
+"""Movements of fewer ticks are not measured: their spectrum is meaningless."""
 
 
 @dataclass(frozen=True, slots=True)
 class MeasureSettings:
-    """What measures depend on; stored beside every table of them.
+    """Settings of the measures; stored with every table of them.
 
     Attributes
     ----------
@@ -52,8 +52,8 @@ class MeasureSettings:
     sparc_highest_hz, sparc_least
         Of :func:`~labcrane.analysis.kinematics.smoothness.sparc`.
     low_pass_hz
-        Cutoff at -3 dB of :func:`~labcrane.analysis.kinematics.smoothness.low_pass`, for what jerk,
-        sub-movements and the length of the way are worked out of.
+        Cutoff at -3 dB of :func:`~labcrane.analysis.kinematics.smoothness.low_pass`, for jerk,
+        sub-movements and path length.
     prominence
         Of :func:`~labcrane.analysis.kinematics.smoothness.sub_movements`.
     limit_tolerance_deg
@@ -61,7 +61,7 @@ class MeasureSettings:
     lag_most_s
         Largest lag of one hand behind the other, in seconds.
     look_least_s
-        How long a first look lasts at least, in seconds.
+        Minimum duration of a first look, in seconds.
     display_delay_s
         From handing a picture to the screen to its light, in seconds, as ``labcrane doctor
         --display`` measures it: which picture was looked at.
@@ -92,12 +92,12 @@ DEFAULTS = MeasureSettings()
 
 @dataclass(frozen=True)
 class MeasuredParticipant(Participant):
-    """A participant whose measures have been worked out before.
+    """A participant with precomputed measures.
 
     Attributes
     ----------
     table
-        What :func:`measures_of` returns.
+        The result of :func:`measures_of`.
     """
 
     table: "pd.DataFrame"
@@ -106,7 +106,7 @@ class MeasuredParticipant(Participant):
 def measures_of(participant: Participant, settings: MeasureSettings = DEFAULTS) -> "pd.DataFrame":
     """Return one row per counted movement of all sessions: condition, results, measures.
 
-    Worked out once, and kept beside the participant file (:mod:`~.analysis.tables.measure_cache`).
+    Computed once, and cached next to the participant file (:mod:`~.analysis.tables.measure_cache`).
     """
     if isinstance(participant, MeasuredParticipant):
         return participant.table
@@ -138,7 +138,7 @@ def measure_or_say_why(participant: Participant) -> tuple[str, str, MeasuredPart
 
 
 def measure_ahead(participant: Participant) -> MeasuredParticipant:
-    """Return a participant with the measures worked out; a worker's function."""
+    """Return a participant with computed measures; a worker's function."""
     table = measures_of(participant)
     return MeasuredParticipant(
         participant.name, participant.path, participant.status, participant.why, table
@@ -152,7 +152,7 @@ def measure_session(
 ) -> "pd.DataFrame":
     """Return a session's trial table with the measures of each movement.
 
-    ``frames`` takes the place of the recorded frames: those of a replay.
+    ``frames``, those of a replay, replace the recorded frames.
     """
     import pandas as pd
 
@@ -222,7 +222,7 @@ def measure(movement: Movement, machine: Machine, settings: MeasureSettings) -> 
     }
     how = {"measured_anew": float(movement.anew)}
     if set(OF_AIMING) <= movement.row.keys() and np.isnan(movement.result("movement_onset")):
-        return nothing | how  # where the machine stood is nobody's accuracy
+        return nothing | how  # where the machine stood is not a measure of accuracy
     if span is None or span.stop - span.start < SHORTEST:
         return nothing | how | errors
     speed, tip = movement.speed[span], movement.tip[span]

@@ -21,7 +21,7 @@ Groups = Mapping[str, "pd.DataFrame"]
 """The columns of loop, input, command and state, one row per tick."""
 
 TICKS = 1 << 16
-"""Of a session, so many are in memory at a time; more where one trial has more."""
+"""Ticks of a session that are in memory at a time; more if one trial has more."""
 
 USED: Mapping[str, tuple[str, ...]] = {
     "loop": ("due", "trial", "paused", "elapsed"),
@@ -53,7 +53,7 @@ class Movement:
     command, angles
         Joint speeds asked for in rad/s and joint angles in rad, shape ``(n, n_joints)``.
     anew
-        Whether the recording has onset and times by a former rule, and ``row`` has them by today's:
+        Whether the recording used a former rule for onset and times, and ``row`` uses the present:
         :func:`by_todays_rule`.
     """
 
@@ -78,7 +78,7 @@ class Movement:
     def span(self) -> slice | None:
         """The ticks from onset to offset, both included; None when one of them is missing.
 
-        Of a task that tells no errors, and so aims at nothing, a movement begins with the reaction.
+        For a task without errors, which has no aim, a movement begins with the reaction.
         """
         aimed = not np.isnan(self.result("error_along"))
         onset = self.result("movement_onset" if aimed else "reaction_time")
@@ -93,7 +93,7 @@ class Movement:
     def pauses(self) -> list[tuple[float, float]]:
         """When it was paused and when it went on, on the run's clock, in seconds.
 
-        The run's clock goes on in a pause, and the trial's does not.
+        The run's clock continues in a pause, and the trial's does not.
         """
         tick = 1.0 / self.rate_hz
         more = np.diff(self.due) - np.diff(self.elapsed)

@@ -1,4 +1,4 @@
-"""The same work for many things at once: here, on the cores of this computer, or on a cluster."""
+"""Parallel work: in this process, on the cores of this computer, or on a cluster."""
 
 import os
 import signal
@@ -11,17 +11,17 @@ OrderT = TypeVar("OrderT")
 ResultT = TypeVar("ResultT")
 
 RETRIES = 3
-"""How often work is given to another worker after its own has died."""
+"""Number of retries of work whose worker died."""
 
 CONNECT_S = 10.0
 """Longest time to wait for a scheduler to answer, in seconds."""
 
 SHARE = 4
-"""Pieces of work below which a worker loads libraries for longer than it works."""
+"""Minimum number of jobs per worker: with fewer, loading libraries takes longer than the work."""
 
 
 def usual_workers(orders: int) -> int:
-    """Return how many processes are worth it for so many pieces of work on this computer."""
+    """Return the useful number of processes for a number of jobs on this computer."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return max(1, min(cores or 1, orders // SHARE))
 
@@ -32,23 +32,23 @@ def work(
     workers: int | None = 1,
     scheduler: str | None = None,
 ) -> Iterator[ResultT]:
-    """Yield what comes of each order, in the order in which they are finished.
+    """Yield the result of each job, in the order in which they finish.
 
-    What a worker does must not depend on which worker it is, and must bear being done twice.
+    A job must not depend on the worker that does it, and it must be repeatable.
 
     Parameters
     ----------
     do
-        A function of a module; it and the orders are sent to other processes.
+        A function of a module; it and the jobs are sent to other processes.
     workers
-        Processes on this computer; 1 is this one, None as many as are worth it.
+        Processes on this computer; 1 is this one, None the useful number.
     scheduler
         Address of a Dask scheduler, ``tcp://host:8786``, whose workers do it instead.
 
     Raises
     ------
     LabcraneError
-        What a worker raised; or the workers died again and again.
+        An error of a worker; or the workers died repeatedly.
     """
     if scheduler is not None:
         return _on_cluster(do, orders, scheduler)
@@ -80,23 +80,23 @@ def _on_cores(
                 why = error
                 continue  # a worker was lost, and the whole pool with it
             except (KeyboardInterrupt, GeneratorExit):
-                # Nobody waits for what is begun: what a worker does leaves nothing when it dies.
+                # Do not wait for jobs under way: a dying worker leaves nothing behind.
                 pool.shutdown(kill_workers=True)
                 raise
             finally:
                 for future in given:
                     future.cancel()
-            # What is done is here: nobody waits for workers to unload their libraries.
+            # All results are here: do not wait for workers to unload their libraries.
             pool.shutdown(kill_workers=True)
         return
     raise LabcraneError(
-        f"worker processes died {1 + RETRIES} times, and {len(left)} of {len(orders)} pieces of "
-        "work are not done; look for what kills them (memory?), or use fewer with --workers"
+        f"worker processes died {1 + RETRIES} times, and {len(left)} of {len(orders)} jobs are "
+        "not done; find out what kills them (memory?), or use fewer with --workers"
     ) from why
 
 
 def _be_ended_by_the_parent() -> None:
-    """Let the interrupt that a terminal sends to all of a program's processes be the parent's."""
+    """Leave the interrupt that a terminal sends to all processes to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
@@ -125,7 +125,7 @@ def _on_cluster(
                 yield result
         except KilledWorker as error:
             raise LabcraneError(
-                f"workers of {scheduler} died again and again: {error}; look into their logs"
+                f"workers of {scheduler} died again and again: {error}; check their logs"
             ) from error
         finally:
             client.cancel(futures)

@@ -1,7 +1,7 @@
 """Presentation of movements: what the operator was shown of each, and whether that was too little.
 
-A view says of each picture when it was shown (``labcrane.feedback.NAME``), and the session when a
-view or sound had failed and was back. Lamp, sync report and results ask :class:`PresentedLimits`.
+A view records when each picture was shown (``labcrane.feedback.NAME``), and the session when a view
+or sound failed and was back. Status light, sync report and results use :class:`PresentedLimits`.
 """
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
@@ -21,25 +21,25 @@ if TYPE_CHECKING:  # a protocol is checked without loading what computes
     from labcrane.types import FloatArray
 
 SILENT_S = 2.0
-"""The recorder says once a second how streams are: a view that hangs is told from one about which
-nothing was heard yet after so long."""
+"""The recorder reports on streams once a second: after this time a hanging view is distinguished
+from one without a report so far."""
 
 ROUNDING_S = 1e-6
 """A picture exactly a second after another one is within that second."""
 
 FAILED = 0.05
-"""Share of a session's movements above which the data deserve a look, and not the report alone."""
+"""Share of a session's movements above which the data need a check, not only the report."""
 
 NAMED = 6
 """Movements named one by one in a sentence."""
 
 
 class PresentedLimits(Settings):
-    """How much of a movement the operator must have been shown; with less it counts for nothing."""
+    """How much of a movement the operator must have been shown; with less it is excluded."""
 
     min_hz: PositiveFloat = 15.0
     """Fewest pictures in any one second of the movement; a shorter movement is judged whole. Below
-    about 15 people steer and place measurably worse (Chen and Thropp, 2007, IEEE Transactions on
+    about 15, people steer and place measurably worse (Chen and Thropp, 2007, IEEE Transactions on
     Systems, Man, and Cybernetics A 37, 1063-1076); a processor that draws reaches 25."""
 
     max_gap_s: PositiveFloat = 0.25
@@ -47,18 +47,18 @@ class PresentedLimits(Settings):
     visual reaction time. A second without a picture is too little by `min_hz` in any case."""
 
     def too_little(self, rate_hz: float, longest_s: float) -> bool:
-        """Whether so few pictures in the worst second, or so long without one, is too little."""
+        """Whether a rate in the worst second, or a time without a picture, is insufficient."""
         return rate_hz < self.min_hz or longest_s > self.max_gap_s
 
     def complaint(self, rate_hz: float | None, silent_s: float | None) -> str:
-        """Say what is wrong with a view at this moment, in a movement; nothing where it is right.
+        """Return the present fault of a view during a movement; empty if there is none.
 
         Parameters
         ----------
         rate_hz
             Pictures in the last second; None where it is not known.
         silent_s
-            How long ago the last picture was, in seconds; None before the first.
+            Time since the last picture, in seconds; None before the first.
         """
         if silent_s is None:
             return "has shown no picture yet"
@@ -72,27 +72,27 @@ class PresentedLimits(Settings):
 PRESENTED: Mapping[str, tuple[str, str]] = {
     "pictures": (
         "1",
-        "pictures that the operator's view showed from the trial's start to its end, pauses left "
-        "out; of several views, those of the one that showed fewest",
+        "pictures that the operator's view showed from the trial's start to its end, without "
+        "pauses; with several views, the smallest number",
     ),
     "fewest_pictures": (
         "Hz",
-        "fewest pictures that it showed in any one second, pauses left out; in a shorter trial, "
-        "those of the whole, per second",
+        "smallest number of pictures in any one second, without pauses; for a shorter trial, "
+        "pictures per second",
     ),
     "longest_without_picture": (
         "s",
-        "longest time without a new picture, pauses left out; that from the start to the first one "
-        "and from the last one to the end count too",
+        "longest time without a new picture, without pauses; includes the times from the start to "
+        "the first picture and from the last one to the end",
     ),
     "feedback_lost": (
         "s",
-        "how long a view of the operator, or a sound that was switched on, had failed and was not "
-        "back, also while the session was paused for it",
+        "how long a view of the operator, or an active sound, had failed, also while the session "
+        "was paused for it",
     ),
     "presentation_failed": (
         "1",
-        "1 where that is less than presented: in the protocol asks for; averages leave it out",
+        "1 where that is less than presented: in the protocol requires; averages exclude it",
     ),
 }
 """Unit and meaning of the columns of :func:`presented`."""
@@ -104,7 +104,7 @@ def operators_views(components: Mapping[str, Mapping[str, Any]]) -> list[str]:
     Parameters
     ----------
     components
-        What a study is made of, as its record has it: ``views.NAME`` with its settings.
+        Components of a study in its record: ``views.NAME`` with settings.
     """
     found = []
     for part, choice in components.items():
@@ -119,8 +119,8 @@ def operators_views(components: Mapping[str, Mapping[str, Any]]) -> list[str]:
 def presented(session: "SessionRecord") -> "pd.DataFrame | None":
     """Return what the operator was shown of each movement, in the rows of the trial table.
 
-    None where nothing was to be shown: the study has no view or sound for the operator, or the
-    session was run without. A view that never showed a picture has shown 0.
+    None if nothing was to be shown: the study has no view or sound for the operator, or the
+    session was run without them. A view that never showed a picture has shown 0.
     """
     import numpy as np
     import pandas as pd
@@ -141,8 +141,8 @@ def presented(session: "SessionRecord") -> "pd.DataFrame | None":
     spans = [clock.at(trials[edge].to_numpy(float)) for edge in ("started", "ended")]
     table = pd.DataFrame(index=trials.index, columns=list(PRESENTED), dtype=float)
     on = [own & {*views, *names} for names in _switched_on(trials, own)]
-    # In a pause the machine is held, so that less was shown is no harm to the movement; that it
-    # was interrupted is to be told.
+    # In a pause the machine is held, so missing pictures do no harm to the movement; the
+    # interruption is reported.
     table["feedback_lost"] = _lost(told, on, trials["started"], trials["ended"])
     silent = _lost(told, [names - {*views} for names in on], spans[0], spans[1], clock)
     limits = _limits(session)
@@ -164,7 +164,7 @@ def presented(session: "SessionRecord") -> "pd.DataFrame | None":
 
 
 class _Clock:
-    """Time of a session in which pauses take none, in seconds."""
+    """Time of a session without its pauses, in seconds."""
 
     def __init__(self, session: "SessionRecord") -> None:
         import numpy as np
@@ -182,7 +182,7 @@ class _Clock:
         return np.asarray(np.interp(times, self._due, self._running))
 
     def running(self, times: "FloatArray") -> "FloatArray":
-        """Return the same of those times that are in the session, and in no pause."""
+        """Return the same for those times that are in the session and not in a pause."""
         import numpy as np
 
         times = times[(times >= self._due[0]) & (times <= self._due[-1])]
@@ -193,9 +193,9 @@ class _Clock:
 def _shown(
     session: "SessionRecord", name: str, clock: _Clock, since: "FloatArray", until: "FloatArray"
 ) -> "tuple[list[int], list[float], list[float]]":
-    """Return of each movement how many pictures a view showed, and the worst of it.
+    """Return the pictures that a view showed in each movement, and the worst values.
 
-    That is how many a second it showed at worst, and the longest time without one.
+    These are the lowest rate per second, and the longest time without a picture.
     """
     import numpy as np
 
@@ -227,7 +227,7 @@ def _fewest(shown: "FloatArray", began: float, over: float) -> float:
 
 
 def _switched_on(trials: "pd.DataFrame", sounds: set[str]) -> list[set[str]]:
-    """Return which feedback was on in each trial; all of it where the record does not say."""
+    """Return the active feedback of each trial; all of it if the record has no list."""
     if "feedback" not in trials:
         return [sounds] * len(trials)
     return [
@@ -242,7 +242,7 @@ def _lost(
     until: Iterable[float],
     clock: _Clock | None = None,
 ) -> list[float]:
-    """Return for how long one of what is named for each movement had failed, in seconds.
+    """Return how long any of the feedback named for each movement had failed, in seconds.
 
     With a ``clock``, whose times ``since`` and ``until`` then are, pauses are left out.
     """
@@ -263,7 +263,7 @@ def _lost(
 
 
 def _outages(told: "pd.DataFrame", own: set[str]) -> list[tuple[float, float]]:
-    """Return from when to when something of the operator's had failed, on the session's clock."""
+    """Return the spans in which feedback of the operator had failed, on the session's clock."""
     found, lost, began = [], set[str](), 0.0
     for name, time, data in zip(told["name"], told["time"], told["data"], strict=True):
         before = bool(lost)
@@ -279,7 +279,7 @@ def _outages(told: "pd.DataFrame", own: set[str]) -> list[tuple[float, float]]:
 
 
 def not_presented(movements: "pd.DataFrame") -> "pd.Series[bool]":
-    """Return of which movements the operator was shown too little."""
+    """Return the movements of which the operator was shown too little."""
     import pandas as pd
 
     if "presentation_failed" not in movements:
@@ -288,9 +288,9 @@ def not_presented(movements: "pd.DataFrame") -> "pd.Series[bool]":
 
 
 def presentation_failed(session: "SessionRecord") -> dict[Attempt, bool]:
-    """Return of each attempt in the trial table whether the operator was shown too little.
+    """Return for each attempt in the trial table whether the operator was shown too little.
 
-    Nothing where nothing was to be shown.
+    Empty if nothing was to be shown.
     """
     table = presented(session)
     if table is None:
@@ -304,7 +304,7 @@ def in_words(movement: Mapping[Hashable, Any]) -> str:
 
     ``412 pictures shown, 5 in the worst second, none for 0.20 s``.
 
-    What had failed is named too: ``feedback lost for 2.50 s``.
+    Failed feedback is named too: ``feedback lost for 2.50 s``.
     """
     found, gap = [], movement["longest_without_picture"]
     if movement["pictures"] == movement["pictures"]:  # a number: there is a view
@@ -316,16 +316,16 @@ def in_words(movement: Mapping[Hashable, Any]) -> str:
 
 
 def judge_presented(session: "SessionRecord") -> tuple[Finding, ...]:
-    """Return what is to be said of movements of which the operator was shown too little."""
+    """Return the findings on movements of which the operator was shown too little."""
     table = presented(session)
     if table is None or not (failed := not_presented(table)).any():
         return ()
     rows = session.trials[["trial"]].join(table)[failed].to_dict("records")
     text = (
         f"in {len(rows)} of {len(table)} movements the operator saw or heard too little; "
-        f"averages leave them out ({_named(rows)})"
+        f"averages exclude them ({_named(rows)})"
     )
-    advice = "close other programs, look at the graphics driver, or choose a lower quality"
+    advice = "close other programs, check the graphics driver, or choose a lower quality"
     if any(row["feedback_lost"] for row in rows):
         advice = "the events feedback.lost say why it failed"
     return (
@@ -334,7 +334,7 @@ def judge_presented(session: "SessionRecord") -> tuple[Finding, ...]:
 
 
 def judge_interrupted(session: "SessionRecord") -> tuple[Finding, ...]:
-    """Return what is to be said of movements that count though feedback had failed in them.
+    """Return the findings on movements that count although feedback failed in them.
 
     The session was paused for it and the machine was held, so that nothing moved unseen.
     """
@@ -349,7 +349,7 @@ def judge_interrupted(session: "SessionRecord") -> tuple[Finding, ...]:
         f"in {len(rows)} of {len(table)} movements a view or sound had failed while the session "
         f"was paused; they count ({_named(rows)})"
     )
-    advice = "leave them out where an interruption matters: feedback_lost in the tables"
+    advice = "exclude them where an interruption matters: feedback_lost in the tables"
     return (Finding(Verdict.WARN, text, advice),)
 
 

@@ -17,7 +17,7 @@ SHOWN = 5
 
 
 def verdict_of_stamps(report: Mapping[str, Any]) -> str:
-    """Return what a recorded sync report says of time stamps alone; nothing where there is none."""
+    """Return a recorded sync report's verdict on timestamps alone; empty without a report."""
     if not {"presented", "interrupted"} & set(report):
         return str(report.get("verdict", ""))
     judged = [*report["streams"], *filter(None, [report["loop"]]), *report["missing"]]
@@ -25,11 +25,11 @@ def verdict_of_stamps(report: Mapping[str, Any]) -> str:
 
 
 def loop_quality(participant: Participant) -> "pd.DataFrame":
-    """Return how late the loop's ticks were, one row per session.
+    """Return the lateness of the loop's ticks, one row per session.
 
-    Lateness is from when a tick was due to when it woke. A late tick is one whose lateness is
+    Lateness is the time from a tick's due time to its wake-up. A late tick is one whose lateness is
     more than a period. A session on a clock that jumps (``--fast``) is never late, and has no
-    streams of others: ``not_there`` names those that it would have had.
+    external streams: ``not_there`` names those that it would have had.
     """
     import pandas as pd
 
@@ -60,10 +60,10 @@ def loop_quality(participant: Participant) -> "pd.DataFrame":
 
 
 def sync_quality(participant: Participant) -> "pd.DataFrame":
-    """Return what the participant file says of the clocks of others, one row per stream.
+    """Return what the participant file states on external clocks, one row per stream.
 
-    Everything that the correction noted stands as a column of its own; ``corrected`` says whether
-    there is a time on our clock at all.
+    Everything that the correction noted has a column of its own; ``corrected`` states
+    whether there is a time on our clock at all.
     """
     import pandas as pd
 
@@ -88,9 +88,9 @@ def sync_quality(participant: Participant) -> "pd.DataFrame":
 
 
 def unprobed(participants: Iterable[Participant]) -> list[str]:
-    """Return the streams whose times rest on no probe of their clock, all or in part, in words.
+    """Return the streams whose clock offset was not measured, at all or in part, in words.
 
-    Their times are wrong by an amount that nobody knows.
+    The error of their times is unknown.
     """
     found = []
     for participant in participants:
@@ -108,7 +108,7 @@ def unprobed(participants: Iterable[Participant]) -> list[str]:
 
 
 def check_probed(participants: Iterable[Participant], *, accept: bool) -> list[str]:
-    """Return the streams whose clock was never probed.
+    """Return the streams whose clock offset was never measured.
 
     Raises
     ------
@@ -119,15 +119,15 @@ def check_probed(participants: Iterable[Participant], *, accept: bool) -> list[s
     if found and not accept:
         more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
         raise RecordingError(
-            f"nobody knows how right the times are of {'; '.join(found[:SHOWN])}{more}: their "
-            "clocks were not probed; leave those streams out of the study, or say "
-            "--accept-unprobed, which is noted in what is written"
+            f"timestamp accuracy of {'; '.join(found[:SHOWN])}{more} is unknown: their "
+            "clock offsets were not measured; remove these streams from the study, or use "
+            "--accept-unprobed (the output notes it)"
         )
     return found
 
 
 def exclusions(movements: "pd.DataFrame") -> "pd.DataFrame":
-    """Return the movements that count for no average, with the reason."""
+    """Return the movements excluded from means, with the reason."""
     names = ["participant", "session", "trial", "attempt", "outcome", "practice"]
     counted = is_result(movements)
     out = movements.reindex(columns=names).loc[~counted].copy()
@@ -164,13 +164,13 @@ def is_done(movements: "pd.DataFrame") -> "pd.Series[bool]":
 
 
 OF_AIMING = ("movement_onset", "movement_time", "error_along")
-"""Results by which an aimed movement is known; trials of other tasks lack the last of them."""
+"""Results that identify an aimed movement; trials of other tasks lack the last of them."""
 
 
 def without_onset(movements: "pd.DataFrame") -> "pd.Series[bool]":
-    """Return which aimed movements have no onset: ended, or given up, before anything moved.
+    """Return which aimed movements have no onset: ended or skipped before anything moved.
 
-    Their errors say where the machine stood and nothing of anybody's accuracy.
+    Their errors say where the machine was, and nothing on accuracy.
     """
     import pandas as pd
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 START = "questionnaire.start"
 DECLINED, OMITTED, LEFT = "declined", "not answered", "questionnaire not handed in"
-"""Why an answer or a score is missing."""
+"""Reasons for a missing answer or score."""
 
 WHEN = ("participant", "status", "session", "step", "block", "trial", "questionnaire")
 ANSWERS = (*WHEN, "version", "language", "item", "value", "text", "missing", "time")
@@ -31,28 +31,28 @@ MEANING = {
     "item": ("", "name of the question"),
     "value": ("", "the answer as a number, or the score; empty where it is none"),
     "text": ("", "the answer in words, or the choice; empty where it is a number"),
-    "missing": ("", f"why there is none: {DECLINED}, {OMITTED}, {LEFT}"),
+    "missing": ("", f"reason for a missing answer: {DECLINED}, {OMITTED}, {LEFT}"),
     "score": ("", "name of the score"),
-    "time": ("s", "when it was given or worked out, on the session's clock"),
+    "time": ("s", "when it was given or computed, on the session's clock"),
 }
 
 
 @dataclass
 class Occasion:
-    """One time that a questionnaire was asked.
+    """One presentation of a questionnaire.
 
     Attributes
     ----------
     step, block, trial
-        Where in the session; ``trial`` is NaN where it follows none.
+        Its place in the session; ``trial`` is NaN if it follows none.
     answers
-        What held at the end, by item, with the time at which it was given.
+        The final answers, by item, with their times.
     scores
-        What was made of them.
+        The scores of the answers.
     handed_in
-        Whether it was handed in.
+        Whether it was submitted.
     ended
-        When it ended; NaN where the program was stopped before.
+        When it ended; NaN if the program stopped before.
     """
 
     questionnaire: str
@@ -66,7 +66,7 @@ class Occasion:
 
 
 def occasions(session: SessionRecord) -> list[Occasion]:
-    """Return each time that a questionnaire was asked in a session, in order."""
+    """Return each presentation of a questionnaire in a session, in order."""
     found: dict[tuple[object, ...], Occasion] = {}
     block = 0
     events = session.events.sort_values("time", kind="stable")
@@ -95,7 +95,7 @@ def occasions(session: SessionRecord) -> list[Occasion]:
 def asked_in(session: SessionRecord) -> Mapping[str, Mapping[str, Any]]:
     """Return title, language, items and scores of each questionnaire of a session's study.
 
-    As the recording says them; older recordings do not.
+    From the recording; older recordings do not have them.
     """
     about: Mapping[str, Mapping[str, Any]] = session.context.get("questionnaires", {})
     return about
@@ -112,10 +112,10 @@ def version_of(session: SessionRecord, questionnaire: str) -> str:
 
 
 def answers_of(participant: Participant) -> "pd.DataFrame":
-    """Return one row per answer, and per question without one, of all sessions.
+    """Return one row per answer, and per item without one, of all sessions.
 
-    ``value`` holds numbers and ``text`` words and choices; where both are empty, ``missing`` says
-    why. Of an answer that was changed, the last one holds.
+    ``value`` contains numbers and ``text`` words and choices; if both are empty, ``missing`` gives
+    the reason. Of a changed answer, the last one applies.
     """
     import pandas as pd
 
@@ -149,7 +149,7 @@ def scores_of(participant: Participant) -> "pd.DataFrame":
 
 
 def beside_trials(measures: "pd.DataFrame", participant: Participant) -> "pd.DataFrame":
-    """Return the table of trials with what was answered after each, and what that was worth.
+    """Return the table of trials with the answers after each, and their scores.
 
     A column is called ``QUESTIONNAIRE.ITEM``; one of a score of the same name as an item,
     ``QUESTIONNAIRE.score.NAME``. An answer to a questionnaire that follows no trial is in no row.
@@ -180,7 +180,7 @@ def beside_trials(measures: "pd.DataFrame", participant: Participant) -> "pd.Dat
 
 
 def score_column(questionnaire: str, score: str, asked: Collection[str]) -> str:
-    """Return what the column of a score beside the trials is called, next to those of items."""
+    """Return the name of a score's column in the trial table, next to those of items."""
     name = f"{questionnaire}.{score}"
     return f"{questionnaire}.score.{score}" if name in asked else name
 
@@ -200,7 +200,7 @@ def _when(participant: Participant, number: int, asked: Occasion) -> dict[str, A
 def _answers(session: SessionRecord, asked: Occasion) -> Iterator[dict[str, Any]]:
     about = asked_in(session).get(asked.questionnaire, {})
     items = [item["name"] for item in about.get("items", ())]
-    # What was answered and is not among the items can only be of an older recording.
+    # Answers that are not among the items can only be from an older recording.
     for name in dict.fromkeys([*items, *asked.answers]):
         value, time = asked.answers.get(name, (None, asked.ended))
         missing = ""

@@ -1,7 +1,7 @@
 """Bundle of a study: everything that another computer needs to install and run it without network.
 
-In it are the wheels of all that is installed here, the study with its lock and plugins, a list of
-checksums, and ``install.py``, which needs nothing but Python.
+It contains the wheels of all installed packages, the study with its lock and plugins, a list of
+checksums, and ``install.py``, which needs only Python.
 """
 
 import json
@@ -54,7 +54,7 @@ class Bundle:
     files
         The study's files, relative to the folder of the protocol.
     size_mb
-        What all of it takes, in MB.
+        Total size, in MB.
     """
 
     path: Path
@@ -69,8 +69,8 @@ def bundle(study: Study, registry: Registry, folder: Path) -> Bundle:
     Raises
     ------
     ProtocolError
-        What is installed here is not what the study was approved with; the folder is there already;
-        a wheel cannot be had.
+        The installed packages are not those of the approval; the folder exists already; a wheel is
+        not available.
     """
     if folder.exists():
         raise ProtocolError(f"{folder} is there already; give the bundle a new folder")
@@ -90,7 +90,7 @@ def bundle(study: Study, registry: Registry, folder: Path) -> Bundle:
 
 
 def _fill(folder: Path, study: Study, files: Sequence[str]) -> int:
-    """Write everything into a folder; return how many packages that are."""
+    """Write everything into a folder; return the number of packages."""
     for name in files:
         copy(study.path.parent / name, folder / STUDY / name)
     packages = list(installed(sys.path))
@@ -126,7 +126,7 @@ def _check_installed(study: Study) -> None:
 
 
 def _study_files(study: Study, registry: Registry) -> Iterator[str]:
-    """Yield what of the protocol's folder is the study: neither data beside it, nor keys."""
+    """Yield the study's files in the protocol's folder: neither data nor keys."""
     folder = study.path.parent
     found = {study.path, *study_files(YamlFile.read(study.path).data, folder)}
     found |= set(files_of_settings(study))
@@ -139,7 +139,7 @@ def _study_files(study: Study, registry: Registry) -> Iterator[str]:
 
 
 def _fetch(packages: list[Distribution], wheels: Path) -> None:
-    """Have pip fetch or build a wheel of each package, of just the version that is here.
+    """Let pip fetch or build a wheel of each package, in exactly the installed version.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def _fetch(packages: list[Distribution], wheels: Path) -> None:
 
 
 def _wanted(package: Distribution) -> str:
-    """Return what pip is asked for: a version of an index, or the folder it was installed from."""
+    """Return the requirement for pip: a version from an index, or the folder it came from."""
     url = source(package).get("url", "")
     if url.startswith("file:"):
         return str(Path(url2pathname(urlsplit(url).path)))
@@ -171,14 +171,14 @@ def _wanted(package: Distribution) -> str:
 
 
 def _checked_wheels(packages: list[Distribution], folder: Path) -> dict[str, Path]:
-    """Return the wheel of each package by its name, with what is installed here in it."""
+    """Return the wheel of each package by its name, with the installed files."""
     wheels = {one_name(path.name.partition("-")[0]): path for path in folder.glob("*.whl")}
     for package in packages:
         name = one_name(package.name)
         if name not in wheels:
-            raise ProtocolError(f"pip made no wheel of {name} {package.version}; install it anew")
+            raise ProtocolError(f"pip made no wheel of {name} {package.version}; reinstall it")
         if not is_working_copy(package) and fingerprint(package) != _of_wheel(wheels[name]):
-            wheels[name].unlink()  # what is here was approved, and not what an index has
+            wheels[name].unlink()  # the installed files were approved, not those of an index
             wheels[name] = repacked(package, folder)
     return wheels
 

@@ -15,11 +15,11 @@ from pathlib import Path
 
 ABOUT, SUMS = "bundle.json", "SHA256SUMS"
 OF_A_DISK = (".DS_Store", "Thumbs.db", "desktop.ini")
-"""Files that systems put beside others without being asked."""
+"""Files that operating systems add to folders."""
 
 
 def main(arguments: list[str]) -> int:
-    """Install the bundle that this file lies in; return 0, or 1 after saying why it cannot be."""
+    """Install the bundle that contains this file; return 0, or 1 after printing why not."""
     bundle = Path(__file__).resolve().parent
     if len(arguments) != 1:
         print(f"write: {Path(sys.executable).name} install.py FOLDER, the folder to install into")
@@ -61,7 +61,7 @@ def _wrong(bundle: Path, target: Path) -> Iterator[str]:
 
 
 def _other_files(bundle: Path) -> Iterator[str]:
-    """Yield each file that is not the one that was packed, is missing, or was put beside them."""
+    """Yield each file that differs from the packed one, is missing, or was added."""
     listed = {(bundle / SUMS).resolve()}
     try:
         lines = (bundle / SUMS).read_text(encoding="utf-8").splitlines()
@@ -76,17 +76,17 @@ def _other_files(bundle: Path) -> Iterator[str]:
             yield f"{name} is missing; copy the bundle again"
         elif hashlib.sha256(path.read_bytes()).hexdigest() != digest:
             yield f"{name} is damaged or was changed; copy the bundle again"
-    # A plugin that was put beside the study's would be run with it.
+    # A plugin that was added to the study's would be run with it.
     for path in sorted(bundle.rglob("*")):
         name = path.relative_to(bundle).as_posix()
         if path.is_symlink():
-            yield f"{name} is a link, which no bundle holds; copy the bundle again"
+            yield f"{name} is a link, which bundles do not contain; copy the bundle again"
         elif path.is_file() and path.resolve() not in listed and path.name not in OF_A_DISK:
-            yield f"{name} is no part of this bundle; remove it, or copy the bundle again"
+            yield f"{name} is not part of this bundle; remove it, or copy the bundle again"
 
 
 def _about(bundle: Path) -> "dict[str, str] | str":
-    """Return what the bundle says of itself, or why that is not to be had."""
+    """Return the bundle's description, or why it cannot be read."""
     try:
         about = json.loads((bundle / ABOUT).read_text(encoding="utf-8"))
         texts = {name: about[name] for name in ("python", "system", "protocol")}
@@ -95,14 +95,14 @@ def _about(bundle: Path) -> "dict[str, str] | str":
         return f"{ABOUT} is missing or damaged ({why}); copy the bundle again"
     inside = bundle.resolve()
     if not all(isinstance(text, str) for text in texts.values()):
-        return f"{ABOUT} is damaged: it says no texts; copy the bundle again"
+        return f"{ABOUT} is damaged: it has no texts; copy the bundle again"
     if not (bundle / texts["protocol"]).resolve().is_relative_to(inside):
         return f"{ABOUT} names a protocol outside of the bundle; copy the bundle again"
     return texts
 
 
 def _kind(of: dict[str, str]) -> tuple[str, list[str]]:
-    """Return for which computers wheels are alike: a system, and Python's first two numbers."""
+    """Return what wheels depend on: the system, and Python's first two numbers."""
     return of["system"], of["python"].split(".")[:2]
 
 

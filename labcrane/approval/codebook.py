@@ -20,7 +20,7 @@ ABOUT = (
     "trial", "attempt", "block", "block_name", "practice", "reference", "group", CONDITION,
     "feedback", "outcome", "completion", "track_success",
 )  # fmt: skip
-"""Columns of the trial table that are labcrane's own, besides those with units."""
+"""labcrane's own columns of the trial table, in addition to those with units."""
 
 EVENTS = (("time", "s"), ("tick", "1"), ("part", "1"), ("trial", "1"), ("name", ""), ("data", ""))
 
@@ -38,9 +38,9 @@ class CodebookColumn:
     unit
         SI symbol; "1" when dimensionless, "" for texts.
     source
-        Who makes it: labcrane, or a plugin and what it offers.
+        Who computes it: labcrane, or a plugin and its component.
     definition
-        What it is, in words, where its name does not say it.
+        Its definition, where its name does not give it.
     """
 
     table: str
@@ -110,7 +110,7 @@ def _has(study: Study, name: str) -> bool:
 
 
 def _conditions(study: Study) -> dict[str, tuple[str, list[Value]]]:
-    """Return what is varied, with all values, of one participant's plan."""
+    """Return the varied factors with all their values, in one participant's plan."""
     (someone,) = pseudonyms(study.protocol.participants.pattern, 1)
     found: dict[str, tuple[str, list[Value]]] = {}
     for number in range(1, len(study.protocol.sessions) + 1):

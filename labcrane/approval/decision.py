@@ -1,4 +1,4 @@
-"""Approval and amendment of a study, and whether it still is what was approved."""
+"""Approval and amendment of a study, and the check that it is unchanged."""
 
 import os
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from labcrane.registry.registry import Registry
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """What a board has granted.
+    """A board's approval.
 
     Attributes
     ----------
     board, reference
-        Who approved the study, and under which number.
+        The board that approved the study, and its reference number.
     valid_until
         Last day on which a person may take part.
     consent
@@ -57,7 +57,7 @@ def approve(study: Study, registry: Registry, grant: Grant, today: date) -> Lock
 def amend(study: Study, registry: Registry, grant: Grant, why: str, today: date) -> Lock:
     """Replace the lock by one of the study as it is now, and keep the history.
 
-    The lock that was replaced stays beside it, as ``protocol.lock.1.json``.
+    The replaced lock stays in the same folder, as ``protocol.lock.1.json``.
 
     Raises
     ------
@@ -93,15 +93,15 @@ def amend(study: Study, registry: Registry, grant: Grant, why: str, today: date)
 
 
 def drift(study: Study, registry: Registry, lock: Lock) -> list[str]:
-    """Return what differs from what was approved, in words; nothing when nothing does."""
+    """Return the differences from the approved study, in words; none if unchanged."""
     now = materials(study, registry, lock.consent)
     return differences(lock.content["materials"], now)
 
 
 def otherwise_installed(lock: Lock) -> list[str]:
-    """Return what is installed in another way than when the study was approved, in words.
+    """Return what is installed differently than when the study was approved, in words.
 
-    Of a lock that says nothing of packages, as the first ones, nothing differs.
+    A lock without packages, as the first ones were, gives no difference.
     """
     before = lock.content.get("environment")
     return changes(before, environment()) if before else []
@@ -113,9 +113,9 @@ def verify(study: Study, registry: Registry, today: date) -> Lock:
     Raises
     ------
     ProtocolError
-        It was not approved, the approval has expired, the study is not the approved one, or what is
-        installed is not, and the protocol refuses that; the message has every difference on a line
-        of its own.
+        It was not approved, the approval has expired, the study is not the approved one, or the
+        installed packages are not and the protocol refuses that; the message has every difference
+        on a line of its own.
     """
     lock = read_lock(study.path)
     lock.check_date(today)
@@ -130,9 +130,9 @@ def verify(study: Study, registry: Registry, today: date) -> Lock:
         listed = "\n".join(f"  {each}" for each in others)
         raise ProtocolError(
             f"{study.path} was approved under {lock.approval['reference']!r} with other packages, "
-            f"and says environment: refuse:\n{listed}\n"
-            "install what there was, as from the study's bundle; record the change with labcrane "
-            "amend; or use --pilot"
+            f"and specifies environment: refuse:\n{listed}\n"
+            "install the approved packages, for example from the study's bundle; record the "
+            "change with labcrane amend; or use --pilot"
         )
     return lock
 

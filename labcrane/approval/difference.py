@@ -10,15 +10,15 @@ SETTINGS = "settings: "
 
 
 def differences(before: Tree, now: Tree) -> list[str]:
-    """Return one line for everything that is not as it was; nothing when all is.
+    """Return one line for every difference; none if there is none.
 
-    Both are what :func:`labcrane.approval.materials.materials` returns.
+    Both arguments are what :func:`labcrane.approval.materials.materials` returns.
     """
     lines = [*_values("protocol", before.get("protocol"), now.get("protocol"))]
     for section, word in (("files", "file"), ("consent", "consent text")):
         lines += _files(word, before.get(section, {}), now.get(section, {}))
     lines += _contents("the machine", before["machine"], now["machine"])
-    # Defaults of a component change with its plugin; what is written has been told above.
+    # Defaults of a component change with its plugin; written settings are reported above.
     lines += _values("settings", before.get("settings"), now.get("settings"))
     lines += _sources("labcrane", before["labcrane"], now["labcrane"])
     for name in sorted({*before["plugins"], *now["plugins"]}):
@@ -60,7 +60,7 @@ def _change(old: object, new: object) -> str:
 
 
 def _leaves(place: str, old: Any, new: Any) -> Iterator[tuple[str, Any, Any]]:
-    """Yield every innermost place at which two trees differ."""
+    """Yield every innermost place where two trees differ."""
     if isinstance(old, Mapping) and isinstance(new, Mapping):
         for key in dict.fromkeys([*old, *new]):
             inner = f"{place}.{key}" if place else str(key)
@@ -90,7 +90,7 @@ def _contents(what: str, before: Tree, now: Tree) -> Iterator[str]:
     elif "lines" in before and "lines" in now:
         yield from _lines(what, before["lines"], now["lines"])
     elif before != now:
-        yield f"{what} has another content"
+        yield f"{what} has different content"
 
 
 def _lines(what: str, before: list[str], now: list[str]) -> Iterator[str]:

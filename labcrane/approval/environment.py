@@ -1,4 +1,4 @@
-"""Environment of a study: what is installed, by version and by what the installer wrote down."""
+"""Environment of a study: the installed packages, by version and by the installer's record."""
 
 import csv
 import hashlib
@@ -17,7 +17,7 @@ from labcrane.registry.entry_points import one_name
 OF_THE_INSTALLER = frozenset(
     {"INSTALLER", "RECORD", "REQUESTED", "direct_url.json", "uv_cache.json", "uv_build.json"}
 )
-"""Files that say how a package came here, and not what it is."""
+"""Files about the installation of a package, not about its content."""
 
 # The parser of mail, which the standard library reads each of them with, takes most of the time.
 _FIELD = re.compile(r"^(Name|Version):[ \t]*(\S.*)$", re.MULTILINE | re.IGNORECASE)
@@ -26,13 +26,13 @@ Environment = Mapping[str, Any]
 
 
 def environment() -> dict[str, Any]:
-    """Return what is installed, ready for JSON.
+    """Return the installed packages, ready for JSON.
 
     Returns
     -------
     dict
         ``system``, ``python``, and ``packages``: for each a ``version`` and ``sha256``, a hash of
-        the names and hashes of its files as its installer recorded them. That is None of a package
+        the names and hashes of its files as its installer recorded them. It is None for a package
         whose files are a working copy or whose installer kept no record.
     """
     return _environment(tuple(sys.path))
@@ -54,7 +54,7 @@ def _environment(path: tuple[str, ...]) -> dict[str, Any]:
 def installed(path: Sequence[str]) -> Iterator[Distribution]:
     """Yield each package on a path once: of two the first, which is the one that is imported.
 
-    What an installer that was interrupted left behind has no name and is none: on Windows, where
+    Remains of an interrupted installation have no name and are not packages: on Windows, where
     files in use cannot be removed, such folders are common.
     """
     return (each for _, _, each in _named(path))
@@ -74,7 +74,7 @@ def _named(path: Sequence[str]) -> Iterator[tuple[str, str | None, Distribution]
 
 
 def fingerprint(of: Distribution) -> str | None:
-    """Return a hash of what a package consists of, equal wherever the same wheel is installed."""
+    """Return a hash of a package's content, equal wherever the same wheel is installed."""
     record = of.read_text("RECORD")
     if record is None or is_working_copy(of):
         return None
@@ -101,7 +101,7 @@ def _counted(record: str) -> Iterator[tuple[str, str]]:
 
 
 def is_working_copy(of: Distribution) -> bool:
-    """Return whether a package is imported from where it is worked on."""
+    """Return whether a package is imported from a working copy."""
     return bool(source(of).get("dir_info", {}).get("editable"))
 
 
@@ -112,7 +112,7 @@ def source(of: Distribution) -> dict[str, Any]:
 
 
 def changes(before: Environment, now: Environment) -> list[str]:
-    """Return one line for everything that is installed in another way; nothing when nothing is.
+    """Return one line for every package that is installed differently; none if there is none.
 
     On another system packages have other files under the same version: only versions are compared.
     """
@@ -131,7 +131,9 @@ def changes(before: Environment, now: Environment) -> list[str]:
         elif old["version"] != new["version"]:
             lines.append(f"{name} was {old['version']}, is {new['version']}")
         elif alike and _other_files(old["sha256"], new["sha256"]):
-            lines.append(f"{name} {new['version']} has other files than the {name} of then")
+            lines.append(
+                f"{name} {new['version']} has other files than when the study was approved"
+            )
     return lines
 
 

@@ -1,4 +1,4 @@
-"""The lock: what was approved, beside the protocol, sealed against edits by hand."""
+"""The lock: the approved study, in the protocol's folder, sealed against manual edits."""
 
 import hashlib
 import json
@@ -15,19 +15,19 @@ FORMAT = "labcrane lock"
 VERSION = 1
 SEAL = "seal"
 APPROVAL = ("board", "reference", "approved", "valid_until", "consent")
-"""What an approval says, in words."""
+"""Texts of an approval."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lock:
-    """An approval, and everything it was given for.
+    """An approval, and everything that it covers.
 
     Attributes
     ----------
     path
-        Where it is.
+        Its path.
     content
-        As it stands in the file, without the seal: ``approval``, ``materials``, ``codebook``,
+        The content of the file, without the seal: ``approval``, ``materials``, ``codebook``,
         ``history``.
     """
 
@@ -47,7 +47,7 @@ class Lock:
 
     @property
     def amendments(self) -> list[dict[str, Any]]:
-        """What was changed since the first approval, in order."""
+        """Changes since the first approval, in order."""
         history: list[dict[str, Any]] = self.content["history"]
         return history
 
@@ -63,7 +63,7 @@ class Lock:
 
     @property
     def consent_version(self) -> str:
-        """What identifies the approved consent text."""
+        """Identifier of the approved consent text."""
         text = self.content["materials"]["consent"]
         return hashlib.sha256(_canonical(text).encode()).hexdigest()[:12]
 
@@ -75,22 +75,22 @@ class Lock:
     def check_before(self, seals: Mapping[str, str]) -> None:
         """Raise :class:`ProtocolError` unless this lock is, or has replaced, every one of before.
 
-        Whoever writes a lock anew can seal it anew; the register knows under which ones people
-        have taken part.
+        A rewritten lock can be sealed again; the register records under which ones people have
+        taken part.
 
         Parameters
         ----------
         seals
-            Under which locks the study was run, each with what was run under it, in words.
+            Seals of the locks under which the study was run, each with its sessions, in words.
         """
         known = self.replaced | {self.seal}
         if others := {seal: what for seal, what in seals.items() if seal not in known}:
             listed = "\n".join(f"  {what}: {seal[:12]}" for seal, what in others.items())
             raise ProtocolError(
                 f"{self.path} ({self.seal[:12]}) is not the lock under which people took part, and "
-                f"no amendment in it has replaced that one, so that it was not written by labcrane "
-                f"amend:\n{listed}\nrestore the lock from a copy, and record what has changed with "
-                "labcrane amend; for an approval of its own give another --data folder"
+                f"contains no amendment that replaces that lock, so labcrane amend did not write "
+                f"it:\n{listed}\nrestore the lock from a copy, and record what has changed with "
+                "labcrane amend; for a separate approval give another --data folder"
             )
 
     def check_date(self, today: date) -> None:
@@ -109,30 +109,30 @@ class Lock:
 
 
 def lock_path(protocol: Path) -> Path:
-    """Return where the lock of a protocol is: ``protocol.lock.json``."""
+    """Return the path of a protocol's lock: ``protocol.lock.json``."""
     return protocol.with_name(f"{protocol.stem}.lock.json")
 
 
 def read_lock(protocol: Path) -> Lock:
-    """Read the lock beside ``protocol``.
+    """Read the lock in the folder of ``protocol``.
 
     Raises
     ------
     ProtocolError
-        There is none, it is none, or it was edited by hand.
+        There is no lock, the file is not a lock, or it was edited by hand.
     """
     path = lock_path(protocol)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ProtocolError(
-            f"{protocol} has not been approved: there is no {path.name} beside it; record the "
-            "approval with labcrane approve, or try the study out with --pilot"
+            f"{protocol} has not been approved: there is no {path.name} in its folder; record the "
+            "approval with labcrane approve, or run a pilot session with --pilot"
         ) from None
     except (OSError, ValueError) as error:
         raise ProtocolError(_edited(path, f"it cannot be read: {error}")) from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise ProtocolError(_edited(path, "it is no lock of labcrane"))
+        raise ProtocolError(_edited(path, "it is not a labcrane lock"))
     if content.get("format_version") != VERSION:
         raise ProtocolError(
             f"{path} has format version {content.get('format_version')!r}, this labcrane reads "
@@ -148,20 +148,20 @@ def read_lock(protocol: Path) -> Lock:
 
 
 def _misshapen(content: Mapping[str, Any]) -> str | None:
-    """Return what no lock of labcrane says, however it is sealed; None where all is well."""
+    """Return the part that cannot be from labcrane, whatever the seal; None if all is well."""
     approval, materials = content.get("approval"), content.get("materials")
     history = content.get("history")
     if not (isinstance(approval, dict) and isinstance(materials, dict) and _is_history(history)):
         return "it lacks the approval, the materials or the history"
     if any(not isinstance(approval.get(name), str) for name in APPROVAL):
-        return f"its approval does not say {', '.join(APPROVAL)}"
+        return f"its approval lacks {', '.join(APPROVAL)}"
     try:
         date.fromisoformat(approval["valid_until"])
     except ValueError:
-        return f"its approval is valid until {approval['valid_until']!r}, which is no day"
+        return f"its approval is valid until {approval['valid_until']!r}, which is not a date"
     consent, text = approval["consent"], materials.get("consent")
     if not (isinstance(text, dict) and list(text) == [consent]):
-        return f"its approval is of the consent text {consent!r}, and its materials hold another"
+        return f"its approval is of the consent text {consent!r}, but its materials contain another"
     place = PurePosixPath(consent)
     if place.is_absolute() or ".." in place.parts:
         return f"its consent text {consent!r} is not in the folder of the protocol"

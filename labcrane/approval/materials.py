@@ -24,7 +24,7 @@ from labcrane.registry.registry import Registry
 
 DATA = frozenset({".yaml", ".yml", ".json"})
 NAMELESS = frozenset({".obj", ".stl", ".pdf"})
-"""What names no other file that is used."""
+"""Files that name no other files."""
 
 MOST_TEXT = 1_000_000
 """Bytes of a file of no known kind that may be YAML and name others."""
@@ -34,10 +34,10 @@ MOST_JSON = 100_000_000
 
 ROBOTS = frozenset({".urdf", ".xml"})
 OF_THE_LAB = frozenset({"certificate", "key"})
-"""What of a page is the laboratory's: everybody may read a lock, and a private key is nobody's to
-read; and a certificate that was renewed changes no study."""
+"""Settings of a page that belong to the laboratory and stay out of the lock: everybody may read a
+lock but no one a private key, and a renewed certificate does not change the study."""
 OWN = "the study's own"
-"""What stands for the version of a file in the study's plugins folder."""
+"""Replaces the version of a file in the study's plugins folder."""
 
 WORDS_ONLY = frozenset({"study", "title", "participants", "operator", "labcrane"})
 """Keys of a protocol under which no plugin for people is named."""
@@ -48,7 +48,7 @@ def materials(
     registry: Registry,
     consent: Path | None = None,
 ) -> dict[str, Any]:
-    """Return what ``study`` consists of, ready for JSON.
+    """Return the materials of ``study``, ready for JSON.
 
     The protocol and YAML or JSON files count as data: white space and comments in them do not
     matter. Other texts count line by line, everything else, and all source, byte by byte. Nothing
@@ -103,7 +103,7 @@ def files_of_settings(study: Study) -> list[Path]:
 
 
 def _inside(path: Path, folder: Path) -> str:
-    """Return a path as it is named from the study's folder, by whatever way it was named.
+    """Return a path relative to the study's folder, however it was named.
 
     A link inside the folder keeps its own name; a way to the folder through one does not count.
     """
@@ -158,7 +158,7 @@ def referred(data: object, folder: Path) -> list[Path]:
 
 
 def _beside(path: Path, folder: Path) -> list[Path]:
-    """Return from where a file names others: of a robot's package, any folder above it as well."""
+    """Return the base folders of a file's references: for robots, any folder above it too."""
     if path.suffix not in ROBOTS:
         return [path.parent]
     return [above for above in path.parents if above.is_relative_to(folder)]
@@ -173,7 +173,7 @@ def _named_in(path: Path) -> Any:
         try:
             return _unquoted(json.loads(path.read_text(encoding="utf-8")))
         except (ValueError, RecursionError) as error:
-            raise ProtocolError(f"{path} is no glTF file: {str(error)[:100]}; export it") from error
+            raise ProtocolError(f"{path} is not glTF: {str(error)[:100]}; export it") from error
     if path.suffix == ".glb":
         return _named_in_glb(path)
     if path.suffix in NAMELESS or (text := _short_text(path)) is None:
@@ -188,18 +188,18 @@ def _unquoted(data: object) -> list[str]:
 
 
 def _named_in_glb(path: Path) -> Any:
-    """Return what a binary glTF file names: its first chunk is JSON, behind 12 bytes and 8."""
+    """Return the names in a binary glTF file: its first chunk is JSON, after 12 and 8 bytes."""
     with path.open("rb") as file:
         head = file.read(20)
         size = int.from_bytes(head[12:16], "little")
         try:
             return _unquoted(json.loads(file.read(min(size, MOST_JSON))))
         except (ValueError, RecursionError) as error:
-            raise ProtocolError(f"{path} is no glTF file: {str(error)[:100]}; export it") from error
+            raise ProtocolError(f"{path} is not glTF: {str(error)[:100]}; export it") from error
 
 
 def _short_text(path: Path) -> str | None:
-    """Return what a file says, if it is a text that is short enough to be YAML."""
+    """Return a file's text, if it is short enough to be YAML."""
     if path.stat().st_size > MOST_TEXT:
         return None
     try:
@@ -214,7 +214,7 @@ def _named_by_robot(path: Path) -> Iterator[str]:
     try:
         elements = list(ElementTree.parse(path).iter())  # noqa: S314 - expat refuses entity bombs
     except (ElementTree.ParseError, ValueError):
-        return  # no robot: who reads it as one says so
+        return  # not a robot: its reader reports it
     folders = {""} | {
         f"{element.get(key)}/"
         for element in elements
@@ -255,7 +255,7 @@ def _strings(data: object) -> Iterator[str]:
 
 
 def content(path: Path) -> dict[str, Any]:
-    """Return what a file says, as far as it can be compared in words."""
+    """Return a file's content in a form that can be compared in words."""
     raw = path.read_bytes()
     try:
         text = raw.decode("utf-8")
@@ -274,7 +274,7 @@ def content_of_text(text: str, *, data: bool) -> dict[str, Any]:
 
 
 def _parsed(text: str) -> Any:
-    """Return YAML, of which JSON is a part, as plain data; None if it is none."""
+    """Return YAML, of which JSON is a part, as plain data; None if it is not YAML."""
     try:
         return _json_like(parse_yaml(text, "a file of the study"))
     except ProtocolError:

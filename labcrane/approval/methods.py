@@ -46,7 +46,7 @@ def _people(protocol: Mapping[str, Any]) -> list[str]:
     if groups := protocol.get("design", {}).get("groups"):
         said.append(
             f"They were allocated to {len(groups)} groups ({', '.join(groups)}) in permuted "
-            f"blocks of {len(groups)}; places of those who dropped out were filled again"
+            f"blocks of {len(groups)}; slots of those who dropped out were refilled"
         )
     return said
 
@@ -84,7 +84,7 @@ def _design(protocol: Mapping[str, Any]) -> list[str]:
         rule: Mapping[str, Any] = {"rule": order} if isinstance(order, str) else order
         words = f"The levels of {factor} came {ORDERS[rule['rule']]}"
         if factor == "condition" and conditions and rule["rule"] in SQUARES:
-            words += ", which participant had which being drawn at random"
+            words += ", assigned to participants at random"
         if rule.get("times", 1) > 1:
             words += f", {rule['times']} times each"
         if rule.get("in_a_row"):
@@ -94,7 +94,7 @@ def _design(protocol: Mapping[str, Any]) -> list[str]:
 
 
 def _given(feedback: str | list[str]) -> str:
-    """Return what a condition is given: ``with the feedback ball and tone``."""
+    """Return a condition's feedback in words: ``with the feedback ball and tone``."""
     if feedback in ("none", []):
         return "without feedback"
     if feedback in ("all", "group"):

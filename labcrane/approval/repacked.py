@@ -1,7 +1,7 @@
 """Wheel of a package as it is installed, where no index has one with the same files.
 
 Debian's Python brings a setuptools and a pip of its own into every environment, under a version
-whose wheel on an index has other files. What is installed is what was approved, so it is packed.
+whose wheel on an index has other files. The installed files were approved, so they are packed.
 """
 
 import base64
@@ -22,21 +22,21 @@ WHEN = (1980, 1, 1, 0, 0, 0)
 
 
 def repacked(package: Distribution, folder: Path) -> Path:
-    """Write a wheel of what is installed, and return it.
+    """Write a wheel of the installed files, and return it.
 
-    Programs that an installer makes itself, for the package's entry points, are not in it; nor is
-    what Python compiled.
+    It contains neither programs that an installer makes for entry points nor compiled Python
+    files.
 
     Raises
     ------
     ProtocolError
-        A file is gone or was changed since it was installed, or stands where no wheel can put it.
+        A file is gone or was changed since it was installed, or is where no wheel can put it.
     """
     record = package.read_text(RECORD)
     about = package.read_text("WHEEL")
     name, version = package.name, package.version
     if record is None or about is None:
-        raise ProtocolError(f"how {name} {version} was installed is not written down; install it")
+        raise ProtocolError(f"no record states how {name} {version} was installed; install it")
     rows: list[tuple[str, str, str]] = []
     whole = io.BytesIO()
     tags = [line.partition(":")[2].strip() for line in about.splitlines() if line[:4] == "Tag:"]
@@ -57,7 +57,7 @@ def repacked(package: Distribution, folder: Path) -> Path:
 
 
 def _files(package: Distribution, record: str) -> Iterator[tuple[str, bytes]]:
-    """Yield each file that its installer wrote down, with what is in it."""
+    """Yield each file of the installer's record, with its content."""
     programs = {each.name for each in package.entry_points if "_scripts" in each.group}
     for path, digest, *_ in filter(None, csv.reader(record.splitlines())):
         file = Path(path)
@@ -69,18 +69,18 @@ def _files(package: Distribution, record: str) -> Iterator[tuple[str, bytes]]:
             continue
         what = f"{path} of {package.name} {package.version}"
         if outside:
-            raise ProtocolError(f"{what} is outside the folder of packages; install it anew")
+            raise ProtocolError(f"{what} is outside the folder of packages; reinstall it")
         place = Path(str(package.locate_file(path)))
         if not place.is_file():
-            raise ProtocolError(f"{what} is gone; install it anew")
+            raise ProtocolError(f"{what} is gone; reinstall it")
         content = place.read_bytes()
         if digest and digest != f"sha256={_digest(content)}":
-            raise ProtocolError(f"{what} was changed after it was installed; install it anew")
+            raise ProtocolError(f"{what} was changed after it was installed; reinstall it")
         yield file.as_posix(), content
 
 
 def _is_program(name: str, programs: set[str]) -> bool:
-    """Whether a program is one that installers make: pip makes pip3 and pip3.11 beside pip."""
+    """Whether a program is one that installers make: pip also makes pip3 and pip3.11."""
     return any(name.rstrip("0123456789.") == each.rstrip("0123456789.") for each in programs)
 
 

@@ -1,4 +1,4 @@
 """The ``labcrane`` command: the only part that prints.
 
-In come words of the command line; out go text, tables, progress and an exit status.
+Input: words of the command line. Output: text, tables, progress and an exit status.
 """

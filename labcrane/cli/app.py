@@ -1,8 +1,8 @@
-"""All commands, and how an error reaches the user.
+"""All commands, and the output of errors.
 
 Importing this must stay instant: a command's module is imported when the command line begins with
-its name, and a command imports what it needs when it runs. The list of all commands takes their
-names and their help only.
+its name, and a command imports what it needs when it runs. The list of all commands reads only
+their names and help lines.
 """
 
 import io
@@ -35,26 +35,26 @@ MODULES = {
     ),
     "data": ("where", "erase", "relabel", "transfer"),
 }  # fmt: skip
-"""Where commands are: a module, and its functions."""
+"""The module of each command, and its functions."""
 
 FEEDBACK, PLUGINS = "feedback", "plugins"
-"""Groups, and the modules they are in."""
+"""Groups, and the modules that contain them."""
 
 COMPLETING = "_LABCRANE_COMPLETE"
-"""Set by a shell that wants to know what can follow."""
+"""Set by a shell that asks for completions."""
 
 UTF8 = ("utf-8", "utf8")
-"""Names of the encoding in which everything is written."""
+"""Names of the encoding of all output."""
 
 PRIVATE = 0o077
-"""What labcrane writes is about people: nobody but the user may read it."""
+"""labcrane writes personal data: only the user may read its files."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; return its exit status: 2 for what cannot be run as written."""
+    """Run the command line; return its exit status: 2 for input that cannot be run as written."""
     before = os.umask(PRIVATE)
     speak_utf8()
-    # Pydantic would look for plugins of its own in all that is installed.
+    # Pydantic would search all installed packages for its own plugins.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         words = sys.argv[1:] if arguments is None else list(arguments)
@@ -77,10 +77,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def speak_utf8() -> None:
-    """Let what is printed into a file or a pipe be UTF-8, here and in processes started here.
+    """Print UTF-8 to files and pipes, here and in processes started here.
 
-    On Windows it would be the code page of the country, which has no word for much of what people
-    write. A terminal keeps its own encoding, and shows a mark for what that does not have.
+    On Windows the default is the country's code page, which lacks many characters. A terminal
+    keeps its own encoding and shows a replacement for characters that it does not have.
     """
     os.environ["PYTHONIOENCODING"] = "utf-8"
     for stream in (sys.stdout, sys.stderr):
@@ -92,7 +92,7 @@ def speak_utf8() -> None:
 
 
 def complain(error: LabcraneError) -> None:
-    """Say on the standard error what went wrong, and what to do."""
+    """Write an error and its remedy to the standard error."""
     from rich.console import Console
 
     complaint = Console(stderr=True, soft_wrap=True)
@@ -108,7 +108,7 @@ def commands(words: Sequence[str]) -> typer.Typer:
         no_args_is_help=True,
         add_completion=first not in known,  # its options come before a command
         pretty_exceptions_enable=False,
-        rich_markup_mode=None,  # what draws boxes round the help takes longer than all the rest
+        rich_markup_mode=None,  # drawing boxes round the help takes longer than all the rest
         cls=Sections,
     )
     app.callback()(_labcrane)
@@ -123,8 +123,8 @@ def commands(words: Sequence[str]) -> typer.Typer:
     if first == PLUGINS or everything:
         app.add_typer(import_module(f"labcrane.cli.commands.{PLUGINS}").app, name=PLUGINS)
     else:
-        extension.add(app, PLUGINS, "What installed plugins offer.")
-    extension.add(app, FEEDBACK, "Views and sounds.")
+        extension.add(app, PLUGINS, "List installed plugins.")
+    extension.add(app, FEEDBACK, "Views and sounds: preview.")
     if first == FEEDBACK or everything:
         extension.fill(app, FEEDBACK, {"preview": _function(FEEDBACK, "preview")})
     extension.extend(app, first, everything=everything)
@@ -138,7 +138,7 @@ def _function(module: str, name: str) -> Callable[..., None]:
 
 
 def _stub(run: Callable[..., None]) -> Callable[[], None]:
-    """Return what has the help of a command and nothing else: options take long to work out."""
+    """Return a command with help only: computing its options takes long."""
 
     def stub() -> None:
         raise AssertionError("a command that is asked for is not a stub")
@@ -159,7 +159,12 @@ def _version(asked: bool) -> None:  # noqa: FBT001 - as typer calls it
 def _labcrane(
     version: Annotated[
         bool,
-        typer.Option("--version", callback=_version, is_eager=True, help="what a bug report needs"),
+        typer.Option(
+            "--version",
+            callback=_version,
+            is_eager=True,
+            help="print the versions for a bug report",
+        ),
     ] = False,
 ) -> None:
     """Studies of people operating cranes and manipulators."""

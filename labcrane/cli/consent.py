@@ -73,9 +73,9 @@ def missing_consent(visit: "Visit") -> Missing | None:
 
 
 def ask_for_consent(visit: "Visit", *, page: bool) -> None:
-    """Ask the examiner at the terminal for a consent that is not on record yet.
+    """Ask the experimenter at the terminal for a consent that is not on record yet.
 
-    Whether the study may be run at all is found out here, before any page is served.
+    Whether the study may be run at all is checked here, before any page is served.
     """
     missing = missing_consent(visit)
     if missing is None or not sys.stdin.isatty():
@@ -87,7 +87,7 @@ def ask_for_consent(visit: "Visit", *, page: bool) -> None:
 
 
 def await_consent(visit: "Visit", console: QueueConsole, say: Callable[[str], None]) -> None:
-    """Ask on the pages for a consent that is not on record, until it is given or the run ended."""
+    """Ask on the pages for a consent that is not on record, until it is given or the run ends."""
     if (missing := missing_consent(visit)) is None:
         return
     file, version = missing.text
@@ -107,7 +107,7 @@ def await_consent(visit: "Visit", console: QueueConsole, say: Callable[[str], No
 
 
 def _given(console: QueueConsole, version: str, kept: list[Command]) -> str | None:
-    """Return who gave the consent, NOBODY when the run is to end; None while nobody has."""
+    """Return who gave the consent, NOBODY when the run is to end; None while it is open."""
     by = None
     for command in console.commands():
         if command.order is Order.END:

@@ -1,4 +1,4 @@
-"""Help of commands in plain words: grouped by what they are for, and without notation of types."""
+"""Help of commands in plain words: grouped by purpose, and without notation of types."""
 
 import re
 from collections.abc import Iterable
@@ -12,16 +12,16 @@ SECTIONS = {
         "tracks", "approve", "amend", "methods", "bundle", "plugins", "new-plugin", "schema",
         "language-server",
     ),
-    "Run it": ("demo", "run", "resume", "consent", "streams", "record"),
-    "Analyse it": ("view", "report", "score", "export", "replay", "compare-engines"),
-    "Keep people and data": (
+    "Run": ("demo", "run", "resume", "consent", "streams", "record"),
+    "Analyse": ("view", "report", "score", "export", "replay", "compare-engines"),
+    "Manage participants and data": (
         "study", "participants", "where", "note", "exclude", "waive", "deviations", "recover",
         "resync", "erase", "relabel", "transfer",
     ),
 }  # fmt: skip
-"""What commands are for, in the order of a study."""
+"""Commands by purpose, in the order of a study."""
 
-OF_PLUGINS = "Of plugins"
+OF_PLUGINS = "Commands from plugins"
 
 WORDS = {
     "str": "TEXT",
@@ -33,7 +33,7 @@ WORDS = {
     "list[str]": "TEXT",
     "list[path]": "PATH",
 }
-"""What stands for a type; a choice is written out."""
+"""The word shown for a type; a choice is written out."""
 
 ARGUMENT = re.compile(r"^  (?P<name>[A-Za-z_]+)(?P<type>(?: <[^>]+>)?(?:\.\.\.)?)", re.MULTILINE)
 PLACE = re.compile(r"\{(?P<name>[A-Za-z_]+)\}")
@@ -41,7 +41,7 @@ TYPE = re.compile(r"<(?P<type>[a-z][^<>]*)>")
 
 
 class Plain(TyperCommand):
-    """A command whose help is for people who do not program."""
+    """A command with help for people who do not program."""
 
     def get_help(self, ctx: Context) -> str:  # type: ignore[override]  # the same class, vendored
         return plain(super().get_help(ctx))
@@ -51,10 +51,10 @@ class Plain(TyperCommand):
 
 
 class Sections(TyperGroup):
-    """The list of all commands, by what they are for."""
+    """The list of all commands, by purpose."""
 
     def format_commands(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001 - typer's own, by version
-        """Write a section for each purpose, and one for what plugins add."""
+        """Write a section for each purpose, and one for plugins."""
         names = self.list_commands(ctx)
         for title, chosen in sections(names):
             rows = [(name, self.get_command(ctx, name)) for name in chosen]

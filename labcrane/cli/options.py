@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-AsJson = Annotated[bool, typer.Option("--json", help="for programs")]
+AsJson = Annotated[bool, typer.Option("--json", help="print JSON, for scripts")]
 PROTOCOL_FILE = "protocol.yaml"
 
 
@@ -26,12 +26,12 @@ ProtocolPath = Annotated[
     ),
 ]
 DataBeside = Annotated[
-    Path | None, typer.Option(help="data folder; data/ beside the protocol by default")
+    Path | None, typer.Option(help="data folder; by default data/ in the protocol's folder")
 ]
 
 
 def data_folder(data: Path | None, protocol: Path | None) -> Path:
-    """Return the data folder that was given, or the one beside the protocol; here without any."""
+    """Return the given data folder, or the one in the protocol's folder, or data/ here."""
     return data or (protocol.parent if protocol else Path()) / "data"
 
 

@@ -10,11 +10,11 @@ if TYPE_CHECKING:
 
 
 class Output:
-    """Standard output, which breaks no line by itself and colours no word."""
+    """Standard output without automatic line breaks or colours."""
 
     @cached_property
     def console(self) -> "Console":
-        """The console, for what draws more than lines."""
+        """The console, for output other than lines."""
         from rich.console import Console
 
         return Console(soft_wrap=True, highlight=False)
@@ -34,7 +34,7 @@ out = Output()
 
 
 def whole_table(*titles: str) -> "Table":
-    """Return a table that breaks what does not fit, and cuts nothing off."""
+    """Return a table that wraps long cells and does not cut them."""
     from rich.table import Table
 
     table = Table()

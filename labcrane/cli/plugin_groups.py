@@ -1,4 +1,4 @@
-"""Groups of commands: those of plugins, put beside labcrane's own."""
+"""Groups of commands from plugins, added to labcrane's own."""
 
 import re
 import sys
@@ -16,7 +16,7 @@ GROUP = "labcrane.commands"
 any plugin (docs/decisions/0110-offers-by-entry-point.md)."""
 
 DOCSTRING = re.compile(r"(?:\s|#.*\n)*(?P<quote>\"{3}|'{3}|\"|')(?P<line>.+?)(?:(?P=quote)|\n)")
-"""How a module begins that says what it is for."""
+"""The beginning of a module with a docstring."""
 
 
 def extend(app: typer.Typer, first: str, *, everything: bool) -> None:
@@ -25,7 +25,7 @@ def extend(app: typer.Typer, first: str, *, everything: bool) -> None:
     With ``everything``, as for a shell that completes what is typed, all of them are filled.
     """
     own = {command.name for command in app.registered_commands}
-    # Two plugins can share a group; its help is by the one that is found first.
+    # Two plugins can share a group; the one found first provides the help.
     modules = {
         point.name: point.value.partition(":")[0]
         for point in reversed(list(entry_points_of(GROUP)))

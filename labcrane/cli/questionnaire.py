@@ -11,7 +11,7 @@ from labcrane.core.roles import Questionnaire
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """The questionnaire that is asked now."""
+    """The questionnaire under way."""
 
     name: str
     questionnaire: Questionnaire
@@ -19,12 +19,12 @@ class Sheet:
     turned: str = ""
 
     def items(self) -> Sequence[Item]:
-        """Return its questions, as the record says that they are shown."""
+        """Return its items, as they are shown according to the record."""
         return in_order(self.questionnaire.items(), self.order, self.turned)
 
     @staticmethod
     def read(item: Item, said: str) -> float | str | None:
-        """Return what was typed as an answer, not yet checked; a dash declines."""
+        """Return the typed answer, not yet checked; a dash declines."""
         if said == "-":
             return None
         if item.kind in {"choice", "text"}:
@@ -35,7 +35,7 @@ class Sheet:
             return said  # which the item refuses
 
     def answer(self, item: Item, value: Value) -> str:
-        """Return the words of the order that gives an answer."""
+        """Return the words of the action that gives an answer."""
         given = {"questionnaire": self.name, "item": item.name, "value": value}
         return json.dumps(given, ensure_ascii=False)
 
@@ -47,7 +47,7 @@ class Sheets:
     questionnaires: Mapping[str, Questionnaire]
 
     def __call__(self, event: Event, sheet: Sheet | None) -> Sheet | None:
-        """Return the questionnaire that is asked after ``event``."""
+        """Return the questionnaire under way after ``event``."""
         if event.name == "questionnaire.start":
             name = str(event.data["questionnaire"])
             asked = self.questionnaires.get(name)
@@ -57,16 +57,16 @@ class Sheets:
 
 
 def sheet_line(event: Event) -> str | None:
-    """Return what is printed of questionnaires and pages; None when nothing is."""
+    """Return the line to print for an event of questionnaires or pages; None for none."""
     data = event.data
     match event.name:
         case "questionnaire.start":
             return f"questionnaire: {data['title']} (on the participant's page, or q here)"
         case "questionnaire.refused":
-            return f"not taken: {data['why']}"
+            return f"not accepted: {data['why']}"
         case "stop_rule.met":
             over = f"{data['questionnaire']} {data['score']} is {data['value']}"
-            return f"STOP RULE: {over}, above {data['above']}; space to go on, e to end"
+            return f"Stop rule: {over}, above {data['above']}; space to continue, e to end"
         case "page.denied":
             return f"refused: {data['why']}"
         case _:

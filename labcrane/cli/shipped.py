@@ -10,10 +10,10 @@ from labcrane.files.atomic import SHARED_FILE, write_text
 from labcrane.protocol.protocol import STUDY_NAME
 
 FOLDERS = ("protocols", "examples/designs", "labcrane_studies")
-"""Where they are beside the package: in the repository, and in what a wheel installs."""
+"""Their places relative to the package: in the repository, and in an installed wheel."""
 
 LEFT = shutil.ignore_patterns("data", "*.lock*.json")
-"""Recordings and the approval of a study that was run where it is; they are not copied."""
+"""Recordings and approval of a study that was run in place; they are not copied."""
 
 
 def shipped_studies() -> dict[str, Path]:

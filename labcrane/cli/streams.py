@@ -15,7 +15,7 @@ SILENT_S = 1.0
 
 
 def watched_lines(view: "StreamView", width: int = WIDTH) -> Iterator[str]:
-    """Yield how a stream comes, and whether its signal is alive."""
+    """Yield a stream's reception, and whether its signal is alive."""
     stream, reading = view.stream, view.reading
     if stream is None:
         yield f"{view.name}: on {view.host}"
@@ -38,7 +38,7 @@ def _head(kind: str, rate_hz: float, channels: int, units: Sequence[str]) -> str
 
 def _clock(reading: "StreamReading") -> str:
     if reading.offset is None or reading.rtt is None:
-        return "not known yet: UDP must pass the firewall"
+        return "unknown so far: UDP must pass the firewall"
     skew = "" if reading.skew_ppm is None else f", {reading.skew_ppm:+.1f} ppm"
     return f"{reading.offset:+.6f} s{skew}, round trip {1e3 * reading.rtt:.2f} ms"
 
@@ -55,20 +55,20 @@ def _flow(reading: "StreamReading") -> str:
         parts.append(f"jitter {1e3 * reading.jitter:.2f} ms")
     if reading.delay is not None and reading.largest_delay is not None:
         late = f"{1e3 * reading.delay:.0f} to {1e3 * reading.largest_delay:.0f} ms"
-        parts.append(f"here {late} after their stamps")
+        parts.append(f"here {late} after their timestamps")
     if reading.gaps:
         parts.append(f"{reading.gaps} gaps, the longest {reading.longest_gap:.3f} s")
     if reading.missing is not None:
         parts.append(f"{reading.missing} lost by its counter")
     if reading.disorder:
-        parts.append(f"{reading.disorder} stamps out of order")
+        parts.append(f"{reading.disorder} timestamps out of order")
     if reading.silent is not None and reading.silent > SILENT_S and reading.rate_hz is not None:
-        parts.append(f"SILENT for {reading.silent:.0f} s")
+        parts.append(f"silent for {reading.silent:.0f} s")
     return ", ".join(parts)
 
 
 def _signal(view: "StreamView") -> Iterator[str]:
-    """Yield the faults, channels with the same one together."""
+    """Yield the faults, with channels of the same fault together."""
     if not view.watched:
         if view.stream is not None:
             yield "no monitor knows this stream"

@@ -1,4 +1,4 @@
-"""Sync report in the terminal: how right time stamps are."""
+"""Sync report in the terminal: timestamp accuracy."""
 
 from typing import TYPE_CHECKING
 

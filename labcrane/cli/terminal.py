@@ -1,4 +1,4 @@
-"""A session in the terminal: what happens is printed, and keys give orders.
+"""A session in the terminal: it prints events, and keys give actions.
 
 Both run in threads of their own, so that a slow terminal never makes the loop wait.
 """
@@ -34,7 +34,7 @@ KEYS: Mapping[str, Order] = {
     "t": Order.TAKE,
 }
 PEOPLES = (*KEYS.values(), Order.ANSWER, Order.SUBMIT)
-"""The orders that people give."""
+"""The actions of the experimenter."""
 
 PROMPTS: Mapping[Order, str] = {
     Order.NOTE: "note: ",
@@ -43,26 +43,26 @@ PROMPTS: Mapping[Order, str] = {
     Order.SETTING: "setting, such as tone.far=3: ",
     Order.TAKE: "take which stream, such as eeg or eeg=amplifier-1: ",
 }
-"""What is asked for orders that need words."""
+"""Prompts of actions that need words."""
 
 HELP = (
-    "space start/go on · p pause · r repeat · s skip · e end · n note · o override · "
+    "space start/continue · p pause · r repeat · s skip · e end · n note · o override · "
     "c completion · h hint · f feedback setting · t take a stream · q fill in the questionnaire"
 )
 
 
 class Terminal:
-    """Prints a session's events and turns keys, or lines of a pipe, into orders.
+    """Prints a session's events and turns keys, or lines of a pipe, into actions.
 
-    With a terminal, single keys; otherwise each line of the standard input is an order and its
+    With a terminal, single keys; otherwise each line of the standard input is an action and its
     words: ``note participant coughs``.
 
     Parameters
     ----------
     counts
-        What the session's trials are called, and how many there are.
+        Names and number of the session's trials.
     keys
-        Whether to listen at all; a simulated session needs nobody.
+        Whether to listen at all; a simulated session needs no person.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class Terminal:
         self._progress.stop()
 
     def say(self, text: str) -> None:
-        """Print what did not come from the session."""
+        """Print a line that is not from the session."""
         self._progress.print(text, markup=False, highlight=False)
 
     def _print(self) -> None:
@@ -140,7 +140,7 @@ class Terminal:
             self._console.give(Command(Order(word), text.strip()))
         elif word:
             known = ", ".join(order.value for order in PEOPLES)
-            self._progress.print(f"{word!r} is not an order; there is {known}", markup=False)
+            self._progress.print(f"{word!r} is not an action; there is {known}", markup=False)
 
     def _key(self, key: str) -> None:
         order = KEYS.get(key)
@@ -154,10 +154,10 @@ class Terminal:
             self._console.give(Command(order))
 
     def _fill_in(self) -> None:
-        """Ask the questions one by one; what is wrong is asked again.
+        """Ask the items one by one; repeat an item after a wrong answer.
 
-        Each answer is given at once, so nothing waits here that could be lost. An empty line, or
-        the session's end, leaves the rest for later.
+        Each answer is passed on at once, so none can be lost here. An empty line, or the
+        session's end, leaves the rest for later.
         """
         sheet = self._sheet
         if sheet is None:
@@ -179,7 +179,7 @@ class Terminal:
         self._console.give(Command(Order.SUBMIT))
 
     def _ask(self, prompt: str) -> str:
-        """Read a line key by key, as the terminal gives single keys now."""
+        """Read a line key by key, since the terminal is in single-key mode."""
         self._progress.print(prompt, end="")
         text = ""
         while (key := next_key(self._over)) not in {"\n", "\r", ""}:
@@ -199,17 +199,23 @@ def _trial_line(data: Mapping[str, object], counts: TrialCounts) -> str:
 
 
 FOLDERS = re.compile(r"(?<=\()/[^():]*/(?=[^/():]+:\d+\))")
-"""The folders of a place in the code; they are in the record, and too long for a line here."""
+"""The folders of a place in the code; the record has them, and they are too long for a line."""
 
 
 def _short(why: str) -> str:
     return FOLDERS.sub("", why)
 
 
-SAID: Mapping[str, str] = {
-    "judgement.awaited": "the test has ended: c completion, o override; space to go on",
+LACKING: Mapping[str, str] = {
+    "stream.lost": "Stream lost",
+    "feedback.awaited": "Waiting for feedback",
 }
-"""What is said of events that are always told alike."""
+"""Labels of events that name a missing part."""
+
+SAID: Mapping[str, str] = {
+    "judgement.awaited": "the test has ended: c completion, o override; space to continue",
+}
+"""Texts of events that are always reported alike."""
 
 
 def _event_line(event: Event) -> str | None:
@@ -224,9 +230,9 @@ def _event_line(event: Event) -> str | None:
         case "block.start":
             return f"block {data['block']}: {data['block_name']}"
         case "input.lost" | "disk.lost" | "plugin.slow" | "trigger.lost" | "trigger.flood":
-            return f"{event.name.upper().replace('.', ' ')}: {_short(str(data['why']))}"
+            return f"{event.name.replace('.', ' ').capitalize()}: {_short(str(data['why']))}"
         case "stream.lost" | "feedback.awaited":
-            return f"{event.name.upper().replace('.', ' ')}: {data['what']}"
+            return f"{LACKING[event.name]}: {data['what']}"
         case "input.back" | "disk.back" | "stream.back":
             return f"{data.get('what', event.name.partition('.')[0])} is back"
         case "pause.start" | "pause.end":

@@ -1,7 +1,7 @@
-"""Typing of the person at a terminal, and lines of a pipe, as each system lets them be waited for.
+"""Keys typed at a terminal, and lines of a pipe, read as each system allows.
 
-Whoever waits looks now and then whether it is over: nothing here waits in a call that only another
-key can end, or, where there is no other way, a thread does that holds nobody up.
+A waiting caller checks regularly whether it is over: nothing here blocks in a call that only
+another key can end; where that cannot be avoided, a thread that blocks nothing else does.
 """
 
 import codecs
@@ -56,13 +56,13 @@ if sys.platform == "win32":
     _chunks = chunks_by_thread
 
     PREFIXES = ("\0", "\xe0")
-    """What comes before the number of a key that is no letter: an arrow, F1."""
+    """Prefixes of the number of a key that is not a letter: an arrow, F1."""
 
     INTERRUPT = "\x03"
 
     @contextmanager
     def single_keys() -> Iterator[None]:
-        """Let the terminal give every key at once: a Windows console does, to who asks for keys."""
+        """Put the terminal into single-key mode: a Windows console needs no setting for it."""
         yield
 
     def next_key(over: threading.Event) -> str:
@@ -98,7 +98,7 @@ else:
 
     @contextmanager
     def single_keys() -> Iterator[None]:
-        """Let the terminal give every key at once, and put it back afterwards."""
+        """Put the terminal into single-key mode, and restore it afterwards."""
         before = termios.tcgetattr(sys.stdin)
         try:
             tty.setcbreak(sys.stdin)
@@ -108,9 +108,9 @@ else:
                 termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
 
     def next_key(over: threading.Event) -> str:
-        """Wait for a key; nothing when it is over, or nobody is there any more.
+        """Wait for a key; return nothing when it is over or the terminal is gone.
 
-        Read past the buffer of sys.stdin: what that holds back, select does not see.
+        Bypass the buffer of sys.stdin: select does not see what that holds back.
         """
         letters = codecs.getincrementaldecoder("utf-8")(errors="replace")
         key = ""

@@ -1,7 +1,7 @@
 """Correction of clocks as in ``streams.sync``, for plain arrays and any recorder's XDF file.
 
-In come stamps of another clock, and what is known of it; out go times on the receiver's clock, and
-how far each may be off.
+Input: timestamps of another clock, and its clock probes. Output: times on the receiver's clock,
+with their uncertainty.
 """
 
 from labcrane.clocks.arrays import Corrected, correct

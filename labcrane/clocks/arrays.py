@@ -1,4 +1,4 @@
-"""Correction of other clocks' time stamps on plain arrays, for any recording."""
+"""Correction of other clocks' timestamps on plain arrays, for any recording."""
 
 from typing import Literal
 
@@ -29,43 +29,43 @@ def correct(
     end: float | None = None,
     own_clock: npt.ArrayLike | None = None,
 ) -> Corrected:
-    """Map time stamps of another clock onto the receiver's, and say how far each may be off.
+    """Map timestamps of another clock onto the receiver's, with the uncertainty of each.
 
     The offset ``o(t)`` of the receiver's clock from the source's is followed in the source's time
     ``t`` by a Kalman smoother with the state (offset, skew, share). Skew does a random walk, so
     that offset is its integral (Kalman 1960; Rauch, Tung and Striebel 1965; in the backward form of
-    Bryson and Frazier). A probe measures ``o + share * excess + e``: *excess* is by how much its
-    round trip is longer than the shortest of all, and *share* which part of that lies on one way,
+    Bryson and Frazier). A probe measures ``o + share * excess + e``: *excess* is the difference of
+    its round trip from the shortest of all, and *share* the part of that on one way,
     between -1/2 and 1/2 (the bound of NTP's clock filter, RFC 5905 section 10, and of its
     huff-n'-puff filter). How fast skew walks and how large ``e`` is are not assumed: a grid of
     models is weighed by likelihood, and averaged by it.
 
-    Where probes leap by more than round trips allow, the clock is another one from there on.
-    Samples without probes are placed by their arrival, and say so. Where probes show that the clock
-    was turned and a regular stream's sampler went on, its count is followed in place of the clock.
+    If probes jump by more than round trips allow, a new clock begins there. Samples without probes
+    are placed by their arrival, and marked so. If probes show that the clock was adjusted while a
+    regular stream's sampler continued, its count is followed instead of the clock.
 
     Parameters
     ----------
     stamps
         As the source gave them, in the order of arrival, in seconds, shape ``(n,)``.
     probes
-        Clock probes: source's time, what must be added to it to have the receiver's, round trip,
-        in seconds, shape ``(n_probes, 3)``; in LSL, what ``lsl_time_correction_ex`` tells.
+        Clock probes: source's time, the offset of the receiver's time from it, round trip, in
+        seconds, shape ``(n_probes, 3)``; in LSL, the result of ``lsl_time_correction_ex``.
     arrivals
         When each sample came, on the receiver's clock, in seconds, shape ``(n,)``.
     counter
-        The source's own number of each sample, without wraps, shape ``(n,)``: tells what is lost.
+        The source's own number of each sample, without wraps, shape ``(n,)``: shows losses.
     rate_hz
         Nominal rate; 0 for irregular streams, such as markers.
     latency_s
         Stated delay of the device from sampling to stamping; subtracted.
     evening
-        Whether stamps of a regular stream are made even: only where they are shown to scatter about
+        Whether timestamps of a regular stream are dejittered: only if they evidently scatter about
         a steady sample clock (``"auto"``), never, or always.
     end
-        When the recording ended, on the receiver's clock: tells of a source that died before.
+        When the recording ended, on the receiver's clock: shows that a source died before.
     own_clock
-        The receiver's clock and, at the same moments, one of the same computer that nothing turns
+        The receiver's clock and, at the same moments, one of the same computer that nothing adjusts
         (on Linux ``CLOCK_MONOTONIC`` and ``CLOCK_MONOTONIC_RAW``), shape ``(n_readings, 2)``:
         where NTP slewed the receiver's clock meanwhile, the source is followed on the other one.
 
@@ -73,18 +73,18 @@ def correct(
     -------
     Corrected
         ``time`` and ``error`` (half width of a 95 % interval) of each sample in seconds,
-        ``uneven``, ``basis`` and a ``quality`` that sums it up.
+        ``uneven`` (before dejittering), ``basis`` and a ``quality`` summary.
 
     Raises
     ------
     RecordingError
-        An array has another shape, or holds what is no number; so does a number, or a rate or a
-        round trip is negative.
+        An array has another shape, a value is not a number, or a rate or a round trip is
+        negative.
 
     Notes
     -----
-    Assumed, and not seen in the data: that the shortest round trip is split evenly. Half of it is
-    part of ``error``. What passes in the device before it stamps is not.
+    Assumption that the data cannot show: the shortest round trip is split evenly. Half of it is
+    part of ``error``. The delay in the device before the timestamp is not.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def correct(
         if (table[:, 2] < 0.0).any():
             raise RecordingError(
                 f"round trips, the third column of probes, are {table[:, 2].min():.6g} s at least; "
-                "none is negative"
+                "they must not be negative"
             )
         table = table[np.argsort(table[:, 0] + table[:, 1], kind="stable")]
         shown = np.column_stack([table, table[:, 0] + table[:, 1]])
@@ -132,7 +132,7 @@ def correct(
         if own.ndim != 2 or own.shape[1] != 2 or not np.isfinite(own).all():  # noqa: PLR2004
             raise RecordingError(
                 "own_clock must be finite numbers of the shape (n, 2), the receiver's clock and "
-                f"one that nothing turns; they have the shape {own.shape}"
+                f"one that nothing adjusts; they have the shape {own.shape}"
             )
     treatment = Treatment(rate_hz=rate_hz, latency_s=latency_s, dejitter=EVENING[evening])
     return correct_raw(RawStream.of(taken, shown, came, index=index, own=own), treatment, end)
@@ -150,5 +150,5 @@ def _column(name: str, values: npt.ArrayLike, count: int | None = None) -> npt.N
         wanted = "(n,)" if count is None else f"({count},), one per stamp"
         raise RecordingError(f"{name} must have the shape {wanted}, but have {column.shape}")
     if not np.isfinite(column).all():
-        raise RecordingError(f"{name} hold what is no number; leave those samples out")
+        raise RecordingError(f"{name} contain values that are not numbers; leave those samples out")
     return column

@@ -24,19 +24,19 @@ from labcrane.types import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Resynced:
-    """What became of an XDF file.
+    """The result of correcting an XDF file.
 
     Attributes
     ----------
     path
-        The HDF5 file with corrected times, their errors and what they rest on, per stream.
+        The HDF5 file with corrected times, their errors and their basis, per stream.
     report
-        How right they are.
+        Their accuracy.
     against_pyxdf
         By stream, the median and the largest distance of the times from pyxdf's, in seconds; empty
         where pyxdf is not installed, cannot read the file, or reads other samples.
     damage
-        What of the file could not be read, one line each.
+        Unreadable parts of the file, one line each.
     unread_by_pyxdf
         Why pyxdf could not read the file; empty where it could, or is not installed.
     """
@@ -49,12 +49,12 @@ class Resynced:
 
 
 def resync_xdf(path: Path) -> Resynced:
-    """Correct the streams of an XDF file by the clock offsets in it, into a file beside it.
+    """Correct the streams of an XDF file by its clock offsets, into a file in the same folder.
 
     Raises
     ------
     RecordingError
-        It cannot be read, holds no stream, or the file beside it cannot be written.
+        It cannot be read, contains no stream, or the new file cannot be written.
     """
     import h5py  # noqa: PLC0415 - loads for a second
 
@@ -62,7 +62,7 @@ def resync_xdf(path: Path) -> Resynced:
         raise RecordingError(f"there is no XDF file {path}")
     streams, states = read_streams([path])
     if not streams:
-        raise RecordingError(f"{path} holds no stream; is it whole?")
+        raise RecordingError(f"{path} contains no stream; it may be incomplete")
     raws = pooled([_raw(one) for one in streams], [one.header.host for one in streams])
     ends = [float(raw.probes[:, 3].max()) for raw in raws if len(raw.probes)]
     corrected = []
@@ -92,7 +92,7 @@ def _damage(states: list[JournalState]) -> tuple[str, ...]:
     """Return what is missing from these times because it could not be read."""
     told = [note for state in states for note in state.notes]
     told += [
-        f"{state.name}: its last {state.torn} bytes are no whole chunk of XDF and were left out"
+        f"{state.name}: its last {state.torn} bytes are not a complete XDF chunk and were left out"
         for state in states
         if state.torn
     ]

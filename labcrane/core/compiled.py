@@ -1,14 +1,14 @@
-"""Compiler of twins: numba, with the one calling convention of each role.
+"""Compiler of kernels: numba, with the one calling convention of each role.
 
 Numba is an extra and loads for a second: it is loaded when the first function is compiled, so
 import a module with compiled functions in :meth:`labcrane.Component.twin` and nowhere else.
 Arithmetic is Python's, operation by operation: nothing is reordered or fused, and a root, a sine or
 a cube root is the C library's, as Python's is. ``math.hypot`` and ``math.dist`` are not: Python
-3.12 rounds them otherwise than 3.11. Write the root of a sum of squares, here and in the component.
+3.12 rounds differently from 3.11. Write the root of a sum of squares, here and in the component.
 
-What was compiled is kept beside its source, for whoever runs it next. Of several processes that
-want it at once, as all that make a cohort do on a computer where nothing was compiled yet, one
-compiles and the others wait for it: each by itself would work as long.
+Compiled code is cached next to its source for the next run. If several processes need it at once,
+as all that simulate a cohort do on a computer where nothing was compiled yet, one compiles and the
+others wait for it: each would need the same time by itself.
 """
 
 from collections.abc import Callable
@@ -20,14 +20,14 @@ from typing import Any, TypeVar
 from labcrane.files.lock import exclusive
 
 TURN = "labcrane.lock"
-"""File that whoever compiles holds, in the folder in which numba keeps what was compiled."""
+"""File locked by the process that compiles, in numba's cache folder."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True, slots=True)
 class Signatures:
-    """What compiled functions are given and return, as numba writes it.
+    """Signatures of compiled functions, in numba's notation.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ def read(function: F) -> F:
     """Compile the tick of an input device.
 
     ``function(own, places, seen, row, inverse, theirs)``: the last two are the controller's inverse
-    and what its twin knows, to be called as ``inverse(theirs, places, velocity, seen, row)``.
+    and the array of its kernel, to be called as ``inverse(theirs, places, velocity, seen, row)``.
     """
     return compile_function(function, signatures().read)
 

@@ -1,4 +1,4 @@
-"""Findings of a check: of a session's time stamps, or of a machine."""
+"""Findings of a check: of a session's timestamps, or of a machine."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Self
 
 
 class Verdict(StrEnum):
-    """How good something is, in words that can be ordered."""
+    """Verdicts, in order of severity."""
 
     PASS = "PASS"  # noqa: S105 - no password
     WARN = "WARN"
@@ -16,16 +16,16 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """How something is, and what to do about it.
+    """The result of a check, and its remedy.
 
     Attributes
     ----------
     verdict
-        Whether it is as it should be.
+        Whether the check passed.
     text
-        What was looked at and what it is like, with numbers and units.
+        What was checked and the result, with numbers and units.
     advice
-        What to do; empty where nothing needs to be done.
+        The remedy; empty if none is needed.
     """
 
     verdict: Verdict
@@ -34,7 +34,7 @@ class Finding:
 
     @classmethod
     def failed(cls, error: Exception) -> Self:
-        """Return an error as a finding: what to do is what it says after its last semicolon."""
+        """Return an error as a finding; its text after the last semicolon is the remedy."""
         said, _, fix = str(error).rpartition("; ")
         return cls(Verdict.FAIL, said or fix, fix if said else "")
 

@@ -1,4 +1,4 @@
-"""Items of a questionnaire, and what may be answered."""
+"""Items of a questionnaire, and their possible answers."""
 
 import math
 import random
@@ -16,19 +16,19 @@ STEP_TOLERANCE = 1e-9
 
 
 class AnswerError(ValueError):
-    """An answer is not one of those an item takes; the message says which it takes."""
+    """An item does not accept an answer; the message states which answers it accepts."""
 
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """One question.
+    """One item.
 
     Attributes
     ----------
     name
         A lower-case word; names the answer in the record.
     text
-        What is asked, in the language of the questionnaire.
+        Its wording, in the language of the questionnaire.
     kind
         ``scale``: a number on steps between ``lowest`` and ``highest``; ``number``: any number
         between them; ``choice``: one of ``choices``; ``text``: words.
@@ -38,18 +38,18 @@ class Item:
     left, right
         Words at the ends of a scale.
     choices, labels
-        Of a choice: what is recorded, and what is shown for each; the same by default.
+        Of a choice: the recorded values, and the text shown for each; the same by default.
     words
-        Of a scale: numbers, and what is written at each.
+        Of a scale: numbers, and the words shown at each.
     numbered
         Whether a scale shows its numbers.
     card
-        Whether it is one of those that are asked in an order drawn by chance.
+        Whether it is one of the items that are presented in random order.
     required
-        Whether the questionnaire cannot be handed in before this is answered, or declined.
+        Whether the questionnaire can be submitted only after this is answered or declined.
     turned
-        Of a card with choices: what is asked where they stand the other way round, which is drawn
-        by chance too; empty where they always stand as they are.
+        Of a card with choices: its wording with the choices in reverse order, which is random
+        too; empty if their order is fixed.
     """
 
     name: str
@@ -70,7 +70,7 @@ class Item:
 
     @property
     def takes(self) -> str:
-        """What may be answered, in words."""
+        """The possible answers, in words."""
         if self.kind == "choice":
             return f"one of {', '.join(self.choices)}"
         if self.kind == "text":
@@ -83,7 +83,7 @@ class Item:
 
     @property
     def steps(self) -> int:
-        """How many steps lead from the lowest answer to the highest; 0 where ``step`` is 0."""
+        """Number of steps from the lowest answer to the highest; 0 where ``step`` is 0."""
         if not self.step:
             return 0
         return math.floor((self.highest - self.lowest) / self.step + STEP_TOLERANCE)
@@ -91,7 +91,7 @@ class Item:
     def at_step(self, number: int) -> float:
         """Return the answer at a step, counted from 0 at the lowest.
 
-        Worked out in decimals, as people write it: 3 steps of 0.1 from 0 are 0.3.
+        Computed in decimals, as people write it: 3 steps of 0.1 from 0 are 0.3.
         """
         lowest, step = (Decimal(repr(float(each))) for each in (self.lowest, self.step))
         # A step written as 0.3333333334 leads beyond a highest of 1 by less than the tolerance.
@@ -105,16 +105,16 @@ class Item:
 
     @property
     def worded(self) -> Mapping[float, str]:
-        """What is written at each of the answers that have words."""
+        """The words of the answers that have some."""
         return {self.nearest(at): words for at, words in self.words}
 
     def check(self, answer: object) -> Value:
-        """Return an answer as it is recorded, a number as its step; None declines the question.
+        """Return an answer as it is recorded, a number as its step; None declines the item.
 
         Raises
         ------
         AnswerError
-            The item does not take it.
+            The item does not accept it.
         """
         if answer is None:
             return None
@@ -137,14 +137,14 @@ class Item:
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """A number worked out of answers.
+    """A number computed from answers.
 
     Attributes
     ----------
     name
         A lower-case word; names the score in the record.
     lowest, highest
-        The range in which the score can be.
+        The range of the score.
     """
 
     name: str
@@ -153,9 +153,9 @@ class Score:
 
 
 def shuffled(items: Sequence[Item], seed: int) -> list[Item]:
-    """Return items with the cards among them in an order drawn by chance; the others stay.
+    """Return items with the cards among them in random order; the others keep their places.
 
-    Each card that can be turned is turned by chance.
+    Each card that can be turned is turned at random.
     """
     cards = [item for item in items if item.card]
     dice = random.Random(seed)  # noqa: S311 - nothing secret
@@ -167,10 +167,10 @@ def shuffled(items: Sequence[Item], seed: int) -> list[Item]:
 
 
 def in_order(items: Sequence[Item], order: str, turned: str = "") -> Sequence[Item]:
-    """Return items as the record says that they are shown.
+    """Return items as they are shown according to the record.
 
-    They are in the order of their names in ``order``, as they come where it is empty; those named
-    in ``turned`` have their choices the other way round.
+    They are in the order of their names in ``order``, unchanged if it is empty; those named in
+    ``turned`` have their choices in reverse order.
     """
     names, round_ = order.split(), turned.split()
     shown = [_turned(item) if item.name in round_ else item for item in items]
@@ -188,7 +188,7 @@ def _turned(card: Item) -> Item:
 
 
 def _written(answer: str) -> str:
-    """Return a text as it is; JSON can hold what no page can show, as halves of surrogates."""
+    """Return a text unchanged; JSON can contain lone surrogates, which no page can show."""
     try:
         check_text(answer, "answer")
     except LimitError as error:
@@ -207,7 +207,7 @@ Answers = Mapping[str, Value]
 def numeric_answers(answers: Answers, names: Sequence[str]) -> list[float]:
     """Return the named answers as numbers, NaN for those that are missing.
 
-    Nothing is imputed: a sum with a missing answer is NaN, and says so.
+    Nothing is imputed: a sum with a missing answer is NaN.
     """
     values = (answers.get(name) for name in names)
     return [float(str(value)) if _is_number(value) else math.nan for value in values]

@@ -23,7 +23,7 @@ class Sphere:
     Attributes
     ----------
     name
-        What it is, unique in a picture: it names its box for eye tracking.
+        Its name, unique in a picture: it names its box for eye tracking.
     centre, radius
         In metres.
     colour
@@ -43,7 +43,7 @@ class Cylinder:
     Attributes
     ----------
     name
-        What it is, unique in a picture: it names its box for eye tracking.
+        Its name, unique in a picture: it names its box for eye tracking.
     start, end
         The middles of its two ends, x, y and z in metres.
     radius
@@ -60,7 +60,7 @@ class Cylinder:
 
 
 Shape = Sphere | Cylinder
-"""What a cue may draw."""
+"""Shapes that a cue may draw."""
 
 TARGET: Colour = (0.90, 0.12, 0.10, 0.85)
 OTHER: Colour = (0.92, 0.92, 0.88, 0.55)
@@ -91,7 +91,7 @@ class TargetFinder:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The targets there can be."""
+        """Names of all possible targets."""
         return tuple(self._places)
 
     def find(self, task: FloatArray) -> Iterator[Sphere]:

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from labcrane.types import FloatArray
 
 Value = float | int | str | bool | None
-"""What an event, a condition or a result may hold: what JSON and a table cell can."""
+"""Values of events, conditions and results: those that fit JSON and a table cell."""
 
 
 class Phase(StrEnum):
-    """Where a trial stands, and how it ended."""
+    """State of a trial, and how it ended."""
 
     IDLE = "idle"  # between trials
     RUNNING = "running"
@@ -52,7 +52,7 @@ class Event:
     time
         When it happened in the simulation, in seconds on the run's clock.
     data
-        What else is to be known, ready for JSON.
+        Further facts, ready for JSON.
     """
 
     name: str
@@ -67,14 +67,14 @@ class PlannedTrial:
     Attributes
     ----------
     condition
-        What is varied in it; becomes columns of the trial table.
+        Its values of the varied factors; they become columns of the trial table.
     expected_s
-        How long it is likely to take, in seconds.
+        Expected duration in seconds.
     counted
-        Whether it is a result. An approach is recorded, but is no row of the trial table.
+        Whether it is a result. An approach movement is recorded, but not in the trial table.
     start_pose
         Joint angles in rad, one per joint, to which the machine is set before the trial; None
-        lets it go on from where it stands.
+        leaves the machine where it is.
     """
 
     condition: Mapping[str, Value]
@@ -90,13 +90,13 @@ class Trial:
     Attributes
     ----------
     number
-        Counts the session's trials from 1, uncounted ones included.
+        Number in the session, from 1, uncounted trials included.
     attempt
-        Counts from 1; more when the trial was repeated.
+        From 1; greater when the trial was repeated.
     seed
-        Seeds everything random in the trial, so that it can be run again.
+        Seed of everything random in the trial, so that it can be reproduced.
     planned
-        What the task planned.
+        The trial as the task planned it.
     """
 
     number: int
@@ -107,16 +107,16 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class TrialStatus:
-    """What a task makes of a frame.
+    """A task's evaluation of a frame.
 
     Attributes
     ----------
     phase
-        Where the trial stands after this tick.
+        The trial's state after this tick.
     values
         The task's own signals, shape ``(n_task,)``: the target, for instance.
     events
-        What happened in this tick.
+        Events of this tick.
     results
         Measures of the finished trial by the names of ``Task.results``; empty while it runs.
     """
@@ -129,25 +129,25 @@ class TrialStatus:
 
 @dataclass(frozen=True)
 class Run:
-    """What is being run: given to every component when it opens.
+    """Facts of a run, given to every component when it opens.
 
     Attributes
     ----------
     rate_hz
         Ticks per second.
     machine
-        What is operated.
+        The machine that is operated.
     participant_seed
-        Seeds what belongs to the participant rather than to a trial.
+        Seed of what belongs to the participant rather than to a trial.
     axes, command, state, task
-        What the frame's arrays of the same names hold.
+        Layouts of the frame's arrays of the same names.
     inverse
-        The axes, shape ``(n_axes,)``, with which a practised hand asks this controller for a tip
+        The axes, shape ``(n_axes,)``, with which a practised operator commands a tip
         velocity in m/s, shape ``(3,)``, in a state, shape ``(n_state,)``. For simulated operators.
     bodies
-        What the machine looks like, for whoever draws it.
+        What the machine looks like, for rendering.
     places
-        Where the tasks' targets can be, for whoever must keep them in sight.
+        Where the tasks' targets can be, for cameras that must keep them in sight.
     """
 
     rate_hz: float
@@ -176,18 +176,18 @@ class Frame:
     elapsed
         Seconds of the trial so far, pauses left out; 0 on its first tick.
     axes, command, state, task
-        Shapes ``(n_axes,)``, ``(n_command,)``, ``(n_state,)``, ``(n_task,)``; what they hold is
-        in the run's layouts. ``task`` is NaN between trials.
+        Shapes ``(n_axes,)``, ``(n_command,)``, ``(n_state,)``, ``(n_task,)``; the run's
+        layouts name their contents. ``task`` is NaN between trials.
     phase
-        Where the trial stood at the end of the tick.
+        The trial's state at the end of the tick.
     trial
         Number of the trial, 0 between trials.
     paused
         Whether the command was held at rest.
     events
-        What happened, in order.
+        Events of the tick, in order.
     shapes
-        What the active cues drew of it; filled in for whoever presents the frame, and nowhere else.
+        Shapes of the active cues; filled in only where the frame is presented.
     """
 
     tick: Tick
@@ -205,14 +205,14 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Echo:
-    """A code that came back from where it was sent to.
+    """A trigger code that the device sent back.
 
     Attributes
     ----------
     code
-        What came back, 1 to 255; a bare number.
+        The code, 1 to 255.
     time
-        When, in seconds on the session's clock, which is ``time.perf_counter``.
+        When it came, in seconds on the session's clock, which is ``time.perf_counter``.
     """
 
     code: int
@@ -221,7 +221,7 @@ class Echo:
 
 @dataclass(frozen=True, slots=True)
 class SessionState:
-    """What a session is about now, for whoever presents it.
+    """The present state of a session, for presentation.
 
     Attributes
     ----------
@@ -230,34 +230,34 @@ class SessionState:
     block, block_name, practice
         The block under way.
     trial, trials
-        Number of the trial, 0 between trials, and how many counted ones the session has.
+        Number of the trial, 0 between trials, and the number of counted ones in the session.
     counted, done
-        Which of the counted trials is running, 0 for none, and how many are over.
+        Number of the running trial among the counted ones, 0 for none, and how many are over.
     active
         Names of the cues and sounds that are switched on; empty between trials.
     settings
-        Settings that the examiner changed, by name of the cue or sound.
+        Settings that the experimenter changed, by name of the cue or sound.
     counts
-        How often each event has happened.
+        Number of times that each event has happened.
     text
-        What the operator is to read as long as it is there: the instructions of the step; empty
-        for nothing.
+        Text for the operator to read: the instructions of the step; empty
+        for none.
     questionnaire
-        The title of the questionnaire that is asked; empty for none.
+        The title of the questionnaire under way; empty for none.
     hint, hint_time
-        The examiner's newest hint, empty before the first, and when it was given.
+        The experimenter's latest hint, empty before the first, and when it was given.
     scene
-        What stands around the machine, as of :func:`labcrane.machines.read_placed`; empty for
-        nothing.
+        The scene around the machine, see :func:`labcrane.machines.read_placed`; empty for
+        none.
     held
-        Who or what holds the session: the examiner, a stop rule, a part that is lost.
+        Who or what holds the session: the experimenter, a stop rule, a lost part.
     waiting
-        What the session waits with for the examiner's order, or that there is a break; empty while
+        What waits for the experimenter's action, or that there is a break; empty while
         it does not wait.
     over
-        Why the session has ended; empty until it has.
+        Reason for the session's end; empty until then.
     fixation
-        The point that the operator is to look at, as shares of the picture's width and height;
+        The fixation point, as shares of the picture's width and height;
         empty for none.
     """
 
@@ -285,28 +285,28 @@ class SessionState:
 
 
 UNDONE = frozenset({Phase.REPEATED, Phase.ENDED, Phase.INTERRUPTED})
-"""How an attempt ends that is not its trial's last."""
+"""Outcomes of attempts that are not the trial's last."""
 
 
 def is_counted(about: Mapping[str, Value]) -> bool:
-    """Whether a trial is one that the study is about: no practice, and not just the way to it.
+    """Whether a trial is part of the results: neither practice nor an approach movement.
 
-    ``about`` is what the trial's events say of it.
+    ``about`` is the data of the trial's events.
     """
     return bool(about.get("counted")) and not about.get("practice")
 
 
 def is_done(ended: Mapping[str, Value]) -> bool:
-    """Whether a counted trial is over for good, by its ``trial.end``.
+    """Whether a counted trial is finally over, by its ``trial.end``.
 
-    One that is repeated is not, nor one in whose middle the session stopped.
+    A repeated trial is not, nor one that the session's end interrupted.
     """
     return is_counted(ended) and ended.get("outcome") not in UNDONE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraImage:
-    """What a camera shows, for the supervisor's page.
+    """A camera's picture, for the experimenter's page.
 
     Attributes
     ----------
@@ -314,9 +314,9 @@ class CameraImage:
         From the top: greys, shape ``(height, width)``, or red, green and blue, shape
         ``(height, width, 3)``.
     due
-        When what it shows happened: the time at which that frame was due, in seconds.
+        The time at which the shown frame was due, in seconds.
     legend
-        What its greys mean, in words; empty when they need none.
+        The meaning of its greys, in words; empty if none is needed.
     """
 
     pixels: npt.NDArray[np.uint8]

@@ -1,4 +1,4 @@
-"""References: what a field of a component's settings names, and what components give names to.
+"""References: names in fields of a component's settings, and the names that components provide.
 
 A plugin annotates the field, and the core looks the name up once every component of the protocol is
 known; the message has the line, what there is, and the nearest name::
@@ -6,7 +6,7 @@ known; the message has the line, what there is, and the nearest name::
     trigger: ButtonName = "right.trigger"
     map: Annotated[dict[JointName, AxisName], Covers("joint"), Once()]
 
-This is names only, so that a protocol is checked without loading what works with them.
+These are names only, so that a protocol is checked without loading the components.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,19 +26,19 @@ Place = tuple[str | int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A mark on a field's type: its text is the name of something.
+    """A mark on a field's type: its text is a name.
 
     Attributes
     ----------
     kind
-        What it names; the names of every kind are what :meth:`Settings.provides` says.
+        Kind of the name; :meth:`Settings.provides` returns the names of every kind.
     signed
-        Whether a leading minus is allowed, and means the same thing turned round.
+        Whether a leading minus is allowed, which inverts the axis.
     own
-        Whether it must be among what the component itself provides: the settings in which the
-        field is, or else those around them.
+        Whether the component itself must provide it: the settings with the field, or else those
+        around them.
     of
-        The key beside it that names a view, which must provide it.
+        The key next to it that names a view, which must provide it.
     """
 
     kind: str
@@ -53,9 +53,9 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class Covers:
-    """A mark on a mapping's type: its keys name everything of a kind that there is.
+    """A mark on a mapping's type: its keys are all names of a kind.
 
-    With ``own`` that is what the component itself provides.
+    With ``own``, all names that the component itself provides.
     """
 
     kind: str
@@ -64,22 +64,22 @@ class Covers:
 
 @dataclass(frozen=True, slots=True)
 class Once:
-    """A mark on a mapping's or a list's type: no two of its values name the same."""
+    """A mark on a mapping's or a list's type: no two of its values are the same name."""
 
 
 Mark = Reference | Covers | Once
 
 AxisName = Annotated[str, Field(pattern=r"^-?[a-z][a-z0-9_.]*$"), Reference("axis", signed=True)]
-"""An axis of the input, ``right.y``; a leading minus turns it round."""
+"""An axis of the input, ``right.y``; a leading minus inverts it."""
 
 InputAxis = Annotated[
     str, Field(pattern=r"^-?[a-z][a-z0-9_.]*$"), Reference("axis of the input", signed=True)
 ]
-"""An axis of the input, named by whoever stands in for it: an operator's own axes are others."""
+"""An axis of the input, named by its substitute: an operator's own axes are different ones."""
 
 ButtonName = Annotated[str, Reference("button")]
-"""A button: an axis of the input that is pressed or not, and has no sign: ``right.trigger``. Of an
-input that does not say which of its axes are buttons, any axis."""
+"""A button: an axis of the input that is pressed or not, and has no sign: ``right.trigger``. For an
+input that does not state which of its axes are buttons, any axis."""
 
 JointName = Annotated[str, Reference("joint")]
 """A joint of the machine."""
@@ -94,7 +94,7 @@ EventName = Annotated[str, Reference("event")]
 """An event of the session or of a task: ``trial.start``."""
 
 SceneObject = Annotated[str, Reference("object")]
-"""What is to be seen: the tip, a link, a target, the shape of a cue, a thing of a scene."""
+"""A visible object: the tip, a link, a target, the shape of a cue, an object of a scene."""
 
 ViewName = Annotated[str, Reference("view")]
 """A view of the protocol."""
@@ -105,14 +105,14 @@ CameraName = Annotated[str, Reference("camera", own=True)]
 
 @dataclass(frozen=True, slots=True, eq=False)  # types are looked up by hash, and it holds a mapping
 class Preset:
-    """A mark on a settings type: a name stands for settings that the plugin comes with.
+    """A mark on a settings type: a name selects settings that the plugin comes with.
 
     Attributes
     ----------
     kind
-        What is named, for the message: ``camera``.
+        The kind of thing, for the message: ``camera``.
     named
-        What each name stands for.
+        The settings of each name.
 
     Examples
     --------
@@ -125,13 +125,13 @@ class Preset:
     def __get_pydantic_core_schema__(
         self, source: type, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Put settings in the place of their name."""
+        """Replace a name by its settings."""
         return core_schema.no_info_before_validator_function(self._found, handler(source))
 
     def __get_pydantic_json_schema__(
         self, core: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """Say the names in the schema."""
+        """Add the names to the schema."""
         return {"anyOf": [{"enum": list(self.named), "type": "string"}, handler(core)]}
 
     def _found(self, value: Any) -> Any:
@@ -153,19 +153,19 @@ EVENTS = (
     "stream.lost", "trial.end",
     "trial.start",
 )  # fmt: skip
-"""What every session can tell, whatever its task."""
+"""Events of every session, independent of its task."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mentioned:
-    """A mark, and what stands at its place.
+    """A mark, and the value at its place.
 
     Attributes
     ----------
     place
         The keys and indices below the component's settings; with ``key`` the key itself is meant.
     holders
-        The settings in which it is, from the outermost to those whose field it is.
+        The settings that contain it, from the outermost to those with the field.
     """
 
     mark: Mark
@@ -176,10 +176,9 @@ class Mentioned:
 
 
 def mentioned(settings: BaseModel) -> Iterator[Mentioned]:
-    """Yield every mark on what a protocol wrote, with its place and its value.
+    """Yield every mark on a written value of a protocol, with its place and its value.
 
-    Defaults are left out: what a component needs without being told, it says by
-    :meth:`Settings.needs`.
+    Defaults are left out: :meth:`Settings.needs` returns the names that they refer to.
     """
     for name, about in type(settings).model_fields.items():
         if name in settings.model_fields_set:
@@ -200,7 +199,7 @@ def _marked(metadata: list[Any], place: Place, value: Any, *, key: bool = False)
 
 
 def _within(annotation: Any, place: Place, value: Any, *, key: bool = False) -> Iterator[Any]:
-    """Yield what is marked inside a type: behind Annotated, in unions, mappings and lists."""
+    """Yield the marks inside a type: behind Annotated, in unions, mappings and lists."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if isinstance(value, BaseModel):
         for each in mentioned(value):
@@ -217,7 +216,7 @@ def _within(annotation: Any, place: Place, value: Any, *, key: bool = False) -> 
 
 
 def _items(arguments: tuple[Any, ...], place: Place, value: Any) -> Iterator[Any]:
-    """Yield what is marked in a mapping's keys and values, and in a list's items."""
+    """Yield the marks in a mapping's keys and values, and in a list's items."""
     if isinstance(value, Mapping):
         kind_of_key, kind = arguments
         for name, item in value.items():
@@ -235,7 +234,7 @@ def _types(arguments: tuple[Any, ...], value: Sequence[Any]) -> Sequence[Any]:
 
 
 def _fits(annotation: Any, value: Any) -> bool:
-    """Whether a member of a union can be what a value was read as."""
+    """Whether a value can be of this member of a union."""
     while get_origin(annotation) is Annotated:
         annotation = get_args(annotation)[0]
     kind = get_origin(annotation) or annotation

@@ -7,9 +7,9 @@ Each role has exactly one method that runs every tick. The loop calls it directl
 pluggy, so it must return soon and must not block. ``labcrane.testing`` has a contract test for
 every role; a plugin's tests subclass it.
 
-:class:`~labcrane.analysis.exporter.Exporter` works on what was recorded, long after.
-A Trigger tells other devices of events, in the tick in which they are known.
-A SignalMonitor looks at the streams of other programs, in a process beside the recorder.
+:class:`~labcrane.analysis.exporter.Exporter` works on recordings, long after.
+A Trigger reports events to other devices, in the tick in which they are known.
+A SignalMonitor checks external streams, in a process next to the recorder.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Component(ABC):
     """Anything a protocol can ``use``. Opened once per run, closed exactly once."""
 
     signals: tuple[Signal, ...] = ()
-    """What this component's tick method returns, in order; known before ``open``."""
+    """The signals that this component's tick method returns, in order; known before ``open``."""
 
     def open(self, run: Run) -> None:
         """Acquire hardware and look up signals. Runs before the first tick."""
@@ -58,26 +58,26 @@ class Component(ABC):
         """Release what ``open`` acquired. Runs even when ``open`` failed."""
 
     def metadata(self) -> Mapping[str, Value]:
-        """Return what the record should know of the open component: calibration, versions."""
+        """Return facts of the open component for the record: calibration, versions."""
         return {}
 
     def twin(self) -> Twin | None:
-        """Return the compiled twin of the open component's tick, for simulations; None for none.
+        """Return the compiled kernel of the open component's tick, for simulations; None for none.
 
-        Of an input device, a controller, a machine or a task: see :mod:`labcrane.core.twin`. Asked
-        for once a session, and only where numba is installed, so import it there.
+        For an input device, a controller, a machine or a task: see :mod:`labcrane.core.twin`.
+        Called once per session, and only if numba is installed, so import numba here.
         """
         return None
 
 
 class InputDevice(Component):
-    """What the operator moves. Its signals are axes, buttons and whether it is connected."""
+    """The controls that the operator moves: their axes, buttons and whether they are connected."""
 
     fault: str | None = None
     """Why the device cannot be trusted now, in words; None while all is well.
 
-    Looked at after every ``read``. While it is set the machine is held at rest and the trial is
-    paused; both go on by themselves when it is None again.
+    Checked after every ``read``. While it is set, the machine is held at rest and the trial is
+    paused; both continue automatically when it is None again.
     """
 
     @abstractmethod
@@ -89,7 +89,7 @@ class InputDevice(Component):
 
 
 class Controller(Component):
-    """What turns the operator's axes into commands for the machine."""
+    """Converts the operator's axes into commands for the machine."""
 
     @abstractmethod
     def command(self, axes: FloatArray, state: FloatArray) -> FloatArray:
@@ -105,17 +105,16 @@ class Controller(Component):
     def inverse(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
         """Return the axes, shape ``(n_axes,)``, that ask for a tip velocity.
 
-        What a practised hand does; simulated operators use it. ``velocity`` is in m/s, shape
-        ``(3,)``, in the machine's base frame. Nothing beyond [-1, 1] is returned: a hand that
-        would need more pushes as far as it goes, in the same direction.
+        The input of a practised operator, for simulated operators. ``velocity`` is in m/s, shape
+        ``(3,)``, in the machine's base frame. Values stay within [-1, 1]: where
+        more would be needed, the deflection is full, in the same direction.
         """
 
     def attainable(self, places: Sequence[Sphere]) -> Mapping[str, float]:
         """Return the tip's speed in m/s that each of its schemes allows at places, by name.
 
-        The median over places and directions, asked for before ``open``. ``labcrane check`` asks
-        where they differ, of a component whose settings say that it provides more than one
-        ``scheme``.
+        The median over places and directions; called before ``open``. ``labcrane check`` warns if
+        they differ, for a component whose settings provide more than one ``scheme``.
         """
         return {}
 
@@ -125,7 +124,7 @@ class Dynamics(Component):
 
     @abstractmethod
     def state(self) -> FloatArray:
-        """Return the state as it stands, shape ``(n_state,)``."""
+        """Return the present state, shape ``(n_state,)``."""
 
     @abstractmethod
     def step(self, command: FloatArray, dt: float) -> FloatArray:
@@ -133,28 +132,28 @@ class Dynamics(Component):
 
     @abstractmethod
     def reset(self, pose: Sequence[float]) -> None:
-        """Set the joints to ``pose`` in rad, at rest, as if nothing had happened before."""
+        """Set the joints to ``pose`` in rad, at rest, without any history."""
 
     @abstractmethod
     def bodies(self) -> Sequence[Body]:
-        """Return what the machine looks like, for whoever draws it."""
+        """Return what the machine looks like, for rendering."""
 
 
 class Task(Component):
     """What the operator is asked to do, and when a trial ends."""
 
     results: tuple[Signal, ...] = ()
-    """What a finished trial is measured by, with units and definitions; columns of the trial table.
+    """Measures of a finished trial, with units and definitions; columns of the trial table.
 
     Codebook, participant file, report and reference take the definitions from here."""
 
     conditions: tuple[Signal, ...] = ()
-    """What is varied in its trials, with units and definitions: the keys of their conditions, which
+    """Variables of its trials, with units and definitions: the keys of their conditions, which
     are columns of the trial table. The unit of a count or ratio is ``"1"``, of words ``""``."""
 
     reports: tuple[str, ...] = ()
-    """What people may say by a button of either page that they have seen, while a trial of it runs:
-    ``("deformity",)``. It comes as the event ``order.report``, with it as ``text``."""
+    """Observations that people can report by a button of either page while its trial runs:
+    ``("deformity",)``. A report is the event ``order.report``, with the observation as ``text``."""
 
     @abstractmethod
     def factors(self) -> Mapping[str, Sequence[str]]:
@@ -165,52 +164,52 @@ class Task(Component):
         """Return a block's trials, for the levels of each factor in the order given."""
 
     def places(self) -> Sequence[Sphere]:
-        """Return where targets can be, of all trials together: cameras are framed on them."""
+        """Return where targets can be in all trials: cameras are framed on them."""
         return ()
 
     @abstractmethod
     def evaluate(self, frame: Frame) -> TrialStatus:
-        """Say where the trial stands after this tick. Not called between trials or in a pause."""
+        """Return the trial's status after this tick. Not called between trials or in a pause."""
 
     @abstractmethod
     def lift_limits(self) -> None:
-        """Let the running trial go on past its automatic ends: a time-out, too many mistakes.
+        """Let the running trial continue past its automatic ends: a time-out, too many mistakes.
 
-        The supervisor's decision. It holds for this trial only.
+        The experimenter's decision. It holds for this trial only.
         """
 
 
 class Questionnaire(Component):
-    """Questions put to the participant, and what the answers are worth.
+    """Items for the participant, and the scores of the answers.
 
-    Shown on the participant's page or asked in the terminal; every answer is recorded the moment
-    it is given. It is asked in a session, so it has no tick method.
+    It is shown on the participant's page or in the terminal; every answer is recorded when it is
+    given. The loop does not run it, so it has no tick method.
     """
 
     title: str
-    """What people call it, in the language in which it asks."""
+    """Its title, in the language of its items."""
 
     rights: str
-    """Where its words come from, and who may use them."""
+    """The source of its wording, and who may use it."""
 
     scores: tuple[Score, ...] = ()
-    """What :meth:`score` returns, and in which range."""
+    """The scores that :meth:`score` returns, with their ranges."""
 
     @abstractmethod
     def items(self) -> Sequence[Item]:
-        """Return the questions, in the order in which they are asked."""
+        """Return the items in the order of presentation."""
 
     @abstractmethod
     def score(self, answers: Answers) -> Mapping[str, float]:
-        """Return every score by its name; NaN for one that needs an answer that is missing."""
+        """Return every score by its name; NaN for a score that needs a missing answer."""
 
 
 class SignalMonitor(Component):
-    """What tells whether the signal of a stream of another program is alive.
+    """Monitors whether the signal of an external stream is alive.
 
-    Built anew for every stream that it knows; ``open``, ``begin_trial`` and ``close`` are never
-    called. It runs in a process of its own beside the recorder, or behind ``streams --watch``. One
-    that raises is left out, and that is said.
+    One is built for every stream that it knows; ``open``, ``begin_trial`` and ``close`` are never
+    called. It runs in a process of its own next to the recorder, or for ``streams --watch``. A
+    monitor that raises is left out, and this is reported.
     """
 
     @abstractmethod
@@ -219,28 +218,28 @@ class SignalMonitor(Component):
 
     @abstractmethod
     def begin(self, stream: SignalStream) -> None:
-        """Be told which stream comes, before its first samples; forget all others."""
+        """Prepare for a stream, before its first samples; forget all others."""
 
     @abstractmethod
     def look(self, times: FloatArray, samples: FloatArray) -> Sequence[SignalFault]:
-        """Take the next samples and return all that is wrong now, for as long as it is.
+        """Take the next samples and return all present faults, as long as they last.
 
         Parameters
         ----------
         times
-            Stamps on the source's clock in seconds, shape ``(n,)``; they may jump or repeat.
+            Timestamps on the source's clock in seconds, shape ``(n,)``; they may jump or repeat.
         samples
-            Shape ``(n, n_channels)``, in the units of the stream's header, with whatever the source
-            sends; ``n`` is what has come, from 1 to some seconds of it.
+            Shape ``(n, n_channels)``, in the units of the stream's header, with all values that the
+            source sends; ``n`` is the number of new samples, up to some seconds of them.
         """
 
 
 class Trigger(Component):
-    """What tells another device of events by a pulse: a port, a box between LSL and TTL.
+    """Reports events to another device by a pulse: a port, a box between LSL and TTL.
 
     Its codes go out in the tick in which the session learns of an event, after the record and
-    before everything else that is told; of several in one tick the others follow, one at a time. It
-    is opened in every session but those of ``--fast``.
+    before all other reports; if a tick has several, the others follow, one at a time. It is opened
+    in every session except with ``--fast``.
     """
 
     codes: Mapping[str, int] | None = None
@@ -248,29 +247,29 @@ class Trigger(Component):
     docs/markers.md without those of events that are learnt late."""
 
     spacing_s: float = 0.0
-    """Least time from one code to the next, in seconds: as long as the device takes to show it and
-    to rest. There is always a tick without a code between two."""
+    """Minimum time between codes, in seconds: the time that the device needs to show one and to
+    return to rest. There is always a tick without a code between two."""
 
     fault: str | None = None
     """Why nothing can be sent now, in words; None while all is well.
 
-    Looked at after every ``send``: what was to be sent then is recorded as not sent. The session
-    goes on, and says so.
+    Checked after every ``send``: a code that could not be sent is recorded as not sent. The
+    session continues and reports this.
     """
 
     @abstractmethod
     def send(self, codes: Sequence[int], now: float) -> Sequence[Echo]:
-        """Send a tick's code, mostly none; return what has come back since the last one.
+        """Send a tick's code, mostly none; return the echoes since the last one.
 
-        Called in every tick, and must not wait. A device that is gone is told by ``fault``, not
-        raised.
+        Called in every tick, and must not wait. Report a device that is gone by ``fault``; do not
+        raise.
 
         Parameters
         ----------
         codes
             None or one, 1 to 255.
         now
-            In seconds on the session's clock: for what ends a pulse.
+            In seconds on the session's clock, to end a pulse.
         """
 
 
@@ -282,9 +281,9 @@ class Cue(Component):
 
     @abstractmethod
     def draw(self, frame: Frame) -> Sequence[Shape]:
-        """Return what is to be seen; the same frame always gives the same shapes.
+        """Return the shapes to show; the same frame always gives the same shapes.
 
-        ``frame.task`` is NaN where the task says nothing, and then there is nothing to draw.
+        ``frame.task`` is NaN where the task gives no value; then there is nothing to draw.
         """
 
     def values(self, frame: Frame) -> FloatArray:
@@ -295,33 +294,33 @@ class Cue(Component):
 
 
 class Feedback(Component):
-    """What presents the session to people: a view, a sound, a lamp.
+    """Presents the session to people: a view, a sound, a lamp.
 
     It runs in a process of its own, at its own pace: each time it is ready it is given the newest
-    frame, and those in between are left out. Its signals are recorded with every frame presented.
+    frame; frames in between are skipped. Its signals are recorded with every frame presented.
     """
 
     streams: Mapping[str, tuple[Signal, ...]] = {}
-    """Further streams it fills, by name, beside its signals; see ``samples``."""
+    """Further streams that it fills, by name; see ``samples``."""
 
     cameras: tuple[str, ...] = ()
-    """Names of the cameras whose pictures the supervisor's page shows; see ``pictures``."""
+    """Names of the cameras whose pictures the experimenter's page shows; see ``pictures``."""
 
     title: str = ""
-    """What a window of it is called; set before it is opened."""
+    """Title of its window; set before it is opened."""
 
     before: Sequence[BaseModel] = ()
-    """Settings of others of the same kind that the protocol names before it, which may have windows
+    """Settings of earlier components of the same kind in the protocol, which may have windows
     already; set before it is opened."""
 
     def update(self, situation: SessionState) -> None:
-        """Be told what the session is about, before the first frame and whenever it changes."""
+        """Take the session's state, before the first frame and whenever it changes."""
 
     @abstractmethod
     def present(self, frame: Frame) -> FloatArray:
         """Show or sound ``frame``; return what was presented, shape ``(n_signals,)``.
 
-        ``frame.shapes`` is what the active cues drew. The moment at which this returns is
+        ``frame.shapes`` contains the shapes of the active cues. The moment at which this returns is
         recorded as the moment of presentation.
         """
 
@@ -329,31 +328,31 @@ class Feedback(Component):
         """Present nothing: between trials, and where the protocol switches it off."""
 
     def adjust(self, settings: BaseModel) -> bool:
-        """Take other settings while open, if that is possible; whether it was.
+        """Apply other settings while open, if possible; return whether it was.
 
-        The examiner changes them while a session runs. Otherwise this component is closed and
-        built anew, which may take long: windows and sound servers do.
+        The experimenter changes them while a session runs. If not possible, this component is
+        closed and rebuilt, which may take long, as for windows and sound servers.
         """
         return False
 
     def preview(self, run: Run, frames: Sequence[Frame], path: Path) -> Sequence[Path]:
         """Write what consecutive frames look or sound like to files, and return their paths.
 
-        ``path`` is where they go, without an ending. Needs neither display nor device, and not to
-        be open. What cannot be written to a file writes none.
+        ``path`` is where they go, without an ending. It needs neither display nor device, nor
+        an open component. A component that cannot be written to a file writes none.
         """
         return ()
 
     def samples(self) -> Mapping[str, FloatArray]:
-        """Return a sample for each of ``streams``; asked for after every ``present``.
+        """Return a sample for each of ``streams``; called after every ``present``.
 
-        Several samples of one stream are rows, in their order: what changed between two frames.
+        Several samples of one stream are rows in order: changes between two frames.
         """
         return {}
 
     def pictures(self) -> Mapping[str, CameraImage]:
         """Return what ``cameras`` show, as of the last ``present``; none while none is due.
 
-        Asked for after a ``present`` while somebody watches.
+        Called after a ``present`` while a page shows them.
         """
         return {}

@@ -1,4 +1,4 @@
-"""Settings of components: the model of what a protocol writes beside ``use``."""
+"""Settings of components: the model of the keys that a protocol gives with ``use``."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ def read_settings(path: Path, model: type[ModelT]) -> ModelT:
     Raises
     ------
     ProtocolError
-        With one line for every mistake: file, line, column, what is written, what is possible.
+        With one line for every mistake: file, line, column, the value, the possible values.
     """
     return YamlFile.read(path).checked(model)
 
 
 @dataclass(frozen=True, slots=True)
 class Within:
-    """A fact of the task's error that is told within a distance, and no more beyond it.
+    """A fact of the task's error that is revealed only within a distance.
 
     Attributes
     ----------
     fact
-        What is learnt: ``how far the tip is from the target``.
+        The revealed fact: ``how far the tip is from the target``.
     far
-        Up to which distance of tip and target, in metres.
+        Maximum distance of tip and target, in metres.
     """
 
     fact: str
@@ -65,43 +65,43 @@ class Settings(StrictModel):
     """Base of every plugin's settings: unknown keys are errors, values never change."""
 
     def reveals(self) -> tuple[str | Within, ...]:
-        """Return what everyone who sees or hears the component learns of the task's error.
+        """Return the facts of the task's error that the component reveals to operators.
 
-        A fact each, nothing by default; components that tell the same use the same words. What
-        these settings make constant is not a fact, and one told up to a distance is
-        :class:`Within` it. What reveals something is feedback, and belongs to the design:
-        ``labcrane check`` asks about it where it is always there, in every group, and where groups,
-        conditions or blocks of one task are told different facts.
+        None by default; components that reveal the same fact use the same words. A value that
+        these settings make constant is not a fact; a fact that is revealed up to a distance is
+        :class:`Within` it. A component that reveals facts is feedback and belongs to the design:
+        ``labcrane check`` warns if it is always on, in every group, and if groups, conditions or
+        blocks of one task get different facts.
         """
         return ()
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
-        """Return numbers that hardly anybody means, by key: ``{"limit_s": "is 0.1 s, and ..."}``.
+        """Return numbers that are probably mistakes, by key: ``{"limit_s": "is 0.1 s, and ..."}``.
 
-        ``labcrane check`` asks whether each is meant, until the protocol says so. The key may lead
-        inside: ``"jaws.grip_n"``, or to an item, counted from 1: ``"questions.2"``.
+        ``labcrane check`` warns about each until the protocol acknowledges it. The key may lead to
+        a nested setting: ``"jaws.grip_n"``, or to an item, counted from 1: ``"questions.2"``.
         """
         return {}
 
     def directions(self, machine: Machine) -> Sequence[str]:
-        """Return what each axis does to the machine, a sentence each, in an operator's words.
+        """Return a sentence on the effect of each axis, in an operator's words.
 
-        A scheme's: ``left stick to the right: the slew turns to the right``. ``labcrane doctor``
-        says it before the controls are moved. Nothing by default.
+        For a scheme: ``left stick to the right: the slew turns to the right``. ``labcrane doctor``
+        prints it before the controls are moved. None by default.
         """
         return ()
 
     def provides(self, machine: Machine) -> Names:
-        """Return the names that a component with these settings gives others to refer to, by kind.
+        """Return the names that other components can refer to, by kind.
 
-        An input says its axes, a task its events, a view its cameras, whatever is seen its objects:
-        :mod:`labcrane.core.references` has the kinds. Of a kind that a component says nothing of,
-        the core looks at the built component's signals, or takes any name for good.
+        An input names its axes, a task its events, a view its cameras, a visible component its
+        objects: :mod:`labcrane.core.references` has the kinds. For a kind that is missing here,
+        the core checks the built component's signals, or accepts any name.
         """
         return {}
 
     def needs(self, machine: Machine) -> Names:
-        """Return the names that a component refers to unwritten, by kind: defaults in use."""
+        """Return the names that a component refers to by default, by kind."""
         return {}
 
 
@@ -114,4 +114,4 @@ StudyPath = Annotated[Path, AfterValidator(_beside), Reference("file")]
 protocol that names it."""
 
 SceneFile = Annotated[StudyPath, Reference("scene")]
-"""A scene's file, which the dynamics must have as well, if it says which it has."""
+"""A scene's file; the dynamics must have the same one, if they name theirs."""

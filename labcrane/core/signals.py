@@ -1,4 +1,4 @@
-"""Named quantities, and where they sit in an array."""
+"""Named quantities, and their places in an array."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ class Signal:
     components
         Names of the parts of a vector, ``("slew", "shoulder")``; empty for a scalar.
     definition
-        What it is, in a sentence without a full stop; a result of a task has one.
+        Its definition, in a sentence without a full stop; results of tasks have one.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Layout:
     Attributes
     ----------
     owner
-        Whose signals these are, in words, for error messages: ``"the machine"``.
+        Owner of the signals, in words, for error messages: ``"the machine"``.
     signals
         In the order in which the array holds them.
     """
@@ -77,7 +77,7 @@ class Layout:
         return len(self.columns)
 
     def find(self, name: str) -> slice:
-        """Return where the signal called ``name`` sits.
+        """Return the place of the signal ``name``.
 
         Components name the quantities they need, and look them up once, in ``open``; a rig
         that lacks one is refused before the first tick.
@@ -91,7 +91,7 @@ class Layout:
         raise ProtocolError(f"{self.owner} has no {name!r}; it has {self._known()}")
 
     def index(self, column: str) -> int:
-        """Return where the number called ``column`` sits: ``"joint.angle.slew"``, ``"left.x"``."""
+        """Return the place of the number ``column``: ``"joint.angle.slew"``, ``"left.x"``."""
         if column in self.columns:
             return self.columns.index(column)
         raise ProtocolError(
@@ -103,9 +103,9 @@ class Layout:
 
 
 def signals_of(names: Sequence[str], units: Mapping[str, str]) -> tuple[Signal, ...]:
-    """Return signals with these columns, in the same order: what a recording was laid out by.
+    """Return signals with these columns, in the same order: the layout of a recording.
 
-    Neighbours that differ in their last word only are the components of one vector.
+    Neighbours that differ only in their last word are the components of one vector.
     """
     signals: list[Signal] = []
     for column in names:
@@ -127,7 +127,7 @@ class SignalChannel:
     Attributes
     ----------
     label, unit, type
-        As the XDF metadata conventions have them; unit and type may be empty.
+        As in the XDF metadata conventions; unit and type may be empty.
     """
 
     label: str
@@ -137,12 +137,12 @@ class SignalChannel:
 
 @dataclass(frozen=True, slots=True)
 class SignalStream:
-    """A stream of another program, as a signal monitor is told of it.
+    """The description of an external stream that a signal monitor gets.
 
     Attributes
     ----------
     name, type
-        As LSL has them.
+        As in LSL.
     rate_hz
         Nominal samples per second, 0 for an irregular stream.
     channels
@@ -157,16 +157,16 @@ class SignalStream:
 
 @dataclass(frozen=True, slots=True)
 class SignalFault:
-    """Something that is wrong with a signal now.
+    """A present fault of a signal.
 
     Attributes
     ----------
     channel
         Label of the channel; empty for the whole stream.
     kind
-        Which fault, in two or three words: ``"flat line"``.
+        The fault, in two or three words: ``"flat line"``.
     message
-        What is seen, with units, and what to do about it.
+        The observation, with units, and its remedy.
     """
 
     channel: str

@@ -1,4 +1,4 @@
-"""The whole allocation of a study: who gets what in which order, and whether that is balanced."""
+"""The complete allocation of a study: participants' conditions and orders, and their balance."""
 
 import csv
 import io
@@ -20,11 +20,11 @@ class Allotment:
     Attributes
     ----------
     seed
-        The participant's own.
+        The participant's seed.
     levels
         The order of each factor's levels.
     condition
-        Which of the participant's conditions it is of, by name; "" for none.
+        Name of the participant's condition; "" for none.
     """
 
     participant: str
@@ -51,9 +51,9 @@ def allocate(study: Study, participants: Mapping[str, int | None]) -> list[Allot
 
 
 def balance(study: Study, allotments: Sequence[Allotment]) -> list[str]:
-    """Return what can be said of the balance of an allocation, line by line.
+    """Return the balance of an allocation, line by line.
 
-    A line that begins with ``not balanced`` says what is not, and what would be.
+    A line that begins with ``not balanced`` names the imbalance and what would be balanced.
     """
     lines = _groups(study, allotments)
     for factor, order in study.protocol.design.order.items():
@@ -84,7 +84,7 @@ def _groups(study: Study, allotments: Sequence[Allotment]) -> list[str]:
 
 
 def _orders(allotments: Sequence[Allotment], factor: str, group: str) -> dict[str, tuple[str, ...]]:
-    """Return each participant's order of a factor: the first block that varies it whole."""
+    """Return each participant's order of a factor: of the first block that varies it completely."""
     found: dict[str, tuple[str, ...]] = {}
     for each in allotments:
         levels = each.levels.get(factor, ())
@@ -94,7 +94,7 @@ def _orders(allotments: Sequence[Allotment], factor: str, group: str) -> dict[st
 
 
 def conditions_in(allotments: Sequence[Allotment], group: str) -> dict[str, tuple[str, ...]]:
-    """Return in which order each participant of a group has conditions for the first time."""
+    """Return the order in which each participant of a group first has conditions."""
     found: dict[str, dict[str, None]] = {}
     for each in allotments:
         if each.group == group and each.condition:

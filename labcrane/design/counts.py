@@ -1,7 +1,7 @@
 """Numbers of trials as people count them: trial 3 of 8, and practice apart.
 
-A plan numbers everything that is run, the way to a trial and practice included; so does the record.
-Whoever counts trials counts those of :attr:`SessionPlan.trials`, on every screen and in every line.
+A plan numbers everything that is run, approach movements and practice included; so does the record.
+Every screen and every line counts the trials of :attr:`SessionPlan.trials`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,14 +14,14 @@ from labcrane.design.plan import SessionPlan
 
 @dataclass(frozen=True, slots=True)
 class TrialCounts:
-    """What people call the trials of a whole session.
+    """Names of a session's trials for people.
 
     Attributes
     ----------
     counted
-        Which trial each is, from 1, by its number in the plan.
+        Number of each counted trial, from 1, by its number in the plan.
     practice
-        Which practice trial each is, from 1, by its number in the plan.
+        Number of each practice trial, from 1, by its number in the plan.
     """
 
     counted: Mapping[int, int]
@@ -29,7 +29,7 @@ class TrialCounts:
 
     @classmethod
     def of(cls, plan: SessionPlan) -> Self:
-        """Return what the trials of ``plan``, which leaves none out, are called."""
+        """Return the names of the trials of ``plan``, which must be complete."""
         practice = (
             trial
             for block in plan.blocks
@@ -44,7 +44,7 @@ class TrialCounts:
 
     @classmethod
     def recorded(cls, blocks: Iterable[Mapping[str, Any]]) -> Self:
-        """Return what the trials of a recording are called, by the ``plan`` in its context.
+        """Return the names of a recording's trials, by the ``plan`` in its context.
 
         Files older than that part of the context leave every trial without a name.
         """
@@ -59,19 +59,19 @@ class TrialCounts:
 
     @property
     def total(self) -> int:
-        """How many trials are counted."""
+        """Number of counted trials."""
         return len(self.counted)
 
     def name(self, number: int) -> str:
-        """Return what the trial of this number in the plan is called."""
+        """Return the name of the trial with this number in the plan."""
         if number in self.counted:
             return f"trial {self.counted[number]} of {self.total}"
         if number in self.practice:
             return f"practice trial {self.practice[number]}"
-        return "the way to a trial"
+        return "an approach movement"
 
     def names(self, wanted: Iterable[int]) -> str:
-        """Return what the trials of these numbers in the plan are called: ``trials 4-8 of 8``."""
+        """Return the names of the trials with these numbers in the plan: ``trials 4-8 of 8``."""
         numbers = list(wanted)
         practice = [self.practice[number] for number in numbers if number in self.practice]
         counted = [self.counted[number] for number in numbers if number in self.counted]
@@ -81,14 +81,14 @@ class TrialCounts:
 
 
 class TableNumbers:
-    """What the record calls trials: by the numbers of its own trial table."""
+    """Names of trials by the numbers of the record's trial table."""
 
     def name(self, number: int) -> str:
-        """Return what the trial of this number in the plan is called."""
+        """Return the name of the trial with this number in the plan."""
         return f"trial {number}"
 
     def names(self, wanted: Iterable[int]) -> str:
-        """Return what the trials of these numbers in the plan are called."""
+        """Return the names of the trials with these numbers in the plan."""
         return _trials(list(wanted))
 
 

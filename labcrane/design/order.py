@@ -1,4 +1,4 @@
-"""Order in which the levels of a factor come."""
+"""Order of a factor's levels."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,15 +11,15 @@ from labcrane.design.squares import Square, latin_square, williams
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Whose order is wanted.
+    """The participant of an order.
 
     Attributes
     ----------
     seed
-        What everything random in it follows from.
+        Seed of everything random in it.
     place
-        Counts the participants of a group from 0, by their slots in the design; says which row of
-        a square is theirs.
+        Number of the participant in the group, from 0, by slots in the design; it selects the row
+        of a square.
     """
 
     seed: int
@@ -53,7 +53,7 @@ def blocked(levels: Sequence[str], turn: Turn, times: int, most: int | None) -> 
 
 
 def written(levels: Sequence[str], turn: Turn, times: int, most: int | None) -> tuple[str, ...]:
-    """Repeat the levels as the protocol has them."""
+    """Repeat the levels in the order of the protocol."""
     del turn, most
     return tuple(levels) * times
 
@@ -77,7 +77,7 @@ RULES: Mapping[str, Rule] = {
     "latin_square": _row_of(latin_square),
     "williams": _row_of(williams),
 }
-"""How to follow what a protocol says under ``design: order:``."""
+"""Functions of the rules under ``design: order:``."""
 
 SQUARES: Mapping[str, Callable[[int], Square]] = {
     "latin_square": latin_square,

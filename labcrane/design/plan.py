@@ -19,14 +19,14 @@ from labcrane.protocol.study import Study
 
 @dataclass(frozen=True, slots=True)
 class OwedQuestionnaire:
-    """A questionnaire after a trial that a session stopped before or in the middle of.
+    """A questionnaire after a trial that a stopped session did not complete.
 
     Attributes
     ----------
     after
-        The trial that is over.
+        The completed trial.
     answered
-        What was answered before.
+        Earlier answers.
     """
 
     after: Trial
@@ -43,35 +43,35 @@ class PlannedBlock:
     name
         The protocol's name for it.
     number
-        Counts the session's blocks from 1, practice included.
+        Number of the block in the session, from 1, practice included.
     task
         The protocol's name of the task.
     practice
         Whether its trials are practice.
     levels
-        The levels of each factor, in the order in which they come; not of one that a track chooses.
+        The levels of each factor, in order; without a factor that a track chooses.
     trials
-        First attempts, in order; with a track the most that there can be, all at its first level.
+        First attempts, in order; with a track the maximum number, all at its first level.
     group
         The participant's between-subject group; "" when the study has none.
     until, last
-        When practice is enough, and whether no further round of it is planned.
+        Criterion that ends practice, and whether this is the last planned round.
     reference
         Whether its trials give the operator's own reference time.
     ask
         Questionnaires after each counted trial.
     feedback
-        What is switched on in each trial, by the trial's number; empty in a study without.
+        Active feedback of each trial, by the trial's number; empty in a study without feedback.
     owed
-        What a session that stopped was still to ask after trials that are over.
+        Remaining questionnaires of a stopped session, after completed trials.
     streak
-        How many counted trials in a row had succeeded before it stopped.
+        Number of counted successes in a row before it stopped.
     track
-        What chooses the levels of a factor while it runs.
+        The track that chooses the levels of a factor while it runs.
     unjudged
-        The number of its test that the supervisor was still to judge before it stopped; 0 for none.
+        The number of the test that the experimenter had still to judge when it stopped; 0 for none.
     condition
-        Which of the participant's conditions it is of, by name; "" for none.
+        Name of the participant's condition; "" for none.
     """
 
     name: str
@@ -94,7 +94,7 @@ class PlannedBlock:
 
     @property
     def expected_s(self) -> float:
-        """How long it is likely to take, in seconds; with a track at most."""
+        """Expected duration in seconds; with a track, the maximum."""
         if self.track is not None:
             return self.track.longest_s * len(self.trials) / self.track.size
         return sum(trial.planned.expected_s for trial in self.trials)
@@ -107,11 +107,11 @@ class PlannedStep:
     Attributes
     ----------
     seconds
-        How long a break is, or each point of a check of the eye tracker is shown, in seconds.
+        Duration of a break, or of each point of a check of the eye tracker, in seconds.
     points
-        Which are to be looked at, as shares of the picture's width and height.
+        The fixation points, as shares of the picture's width and height.
     answered
-        What was answered of its questionnaires before the session stopped.
+        Answers to its questionnaires before the session stopped.
     """
 
     number: int
@@ -125,7 +125,7 @@ class PlannedStep:
 
     @property
     def expected_s(self) -> float:
-        """How long it is likely to take, in seconds."""
+        """Expected duration in seconds."""
         if self.block:
             return self.block.expected_s
         if self.kind == "fixation":
@@ -140,13 +140,13 @@ class SessionPlan:
     Attributes
     ----------
     seed
-        The participant's own.
+        The participant's seed.
     slot
         The participant's place in the design, counted from 1.
     group
         Between-subject group; "" when the study has none.
     held
-        Who held the session when it stopped, and holds it still.
+        Who or what holds the session since before it stopped.
     """
 
     participant: str
@@ -165,9 +165,9 @@ class SessionPlan:
 
     @property
     def trials(self) -> tuple[Trial, ...]:
-        """The trials that a study is about, which whoever counts trials counts.
+        """The trials that a study is about: those that are counted.
 
-        Practice and what only leads to the next trial are not among them.
+        Practice and approach movements are not among them.
         """
         return tuple(
             trial
@@ -179,12 +179,12 @@ class SessionPlan:
 
     @property
     def expected_s(self) -> float:
-        """How long the session is likely to take, in seconds."""
+        """Expected duration of the session in seconds."""
         return sum(step.expected_s for step in self.steps)
 
 
 class Planner:
-    """Plans one session; counts its blocks and trials on the way."""
+    """Plans one session, and numbers its blocks and trials."""
 
     def __init__(self, study: Study, participant: str, session: int, slot: int) -> None:
         self._study = study
@@ -272,14 +272,14 @@ class Planner:
         return PlannedTrack(block.track, track, self._trials + 1, size * track.rounds, rounds)
 
     def _rounds(self, track: PlannedTrack) -> list[PlannedTrial]:
-        """Return as many rounds as there can be, at the level that the track begins with."""
+        """Return the maximum number of rounds, at the track's first level."""
         first = standing(track.settings).level
         if first is None:
             raise AssertionError("a track does not end before it begins")
         return list(track.rounds[first]) * track.settings.rounds
 
     def _shift(self, factor: str) -> int:
-        """Return by how many rows a further square is shifted, so that two squares get crossed.
+        """Return the number of rows by which a further square is shifted, to cross two squares.
 
         Whenever all rows of the first square have been used, the others begin a row later.
         """
@@ -300,7 +300,7 @@ class Planner:
     def _feedback(
         self, chosen: Switch, fading: Sequence[float], trials: Sequence[Trial]
     ) -> dict[int, tuple[str, ...]]:
-        """Return what is on in each trial; an uncounted one is like the counted one after it."""
+        """Return each trial's active feedback; an uncounted one is like the next counted one."""
         protocol = self._study.protocol
         if not protocol.feedback:
             return {}
@@ -327,17 +327,17 @@ class Planner:
 
 
 def _of_condition(condition: str, trials: Sequence[PlannedTrial]) -> Sequence[PlannedTrial]:
-    """Return trials that say of which condition within participants they are; of none, as is."""
+    """Return trials with their condition within participants; unchanged without one."""
     if not condition:
         return trials
     return [replace(each, condition={**each.condition, CONDITION: condition}) for each in trials]
 
 
 def conditions_of(study: Study, participant: str, group: str, place: int) -> tuple[str, ...]:
-    """Return a participant's conditions in the order in which they come, alike in all sessions.
+    """Return a participant's conditions in order; it is the same in all sessions.
 
-    Of each group as many participants as a square has rows get every row once, in an order that is
-    drawn: whoever knows the last one's does not know the next one's.
+    Of each group as many participants as a square has rows get every row once, in a random
+    order: the last participant's row does not reveal the next one's.
     """
     design, name = study.protocol.design, study.protocol.study
     order, levels = design.order.get(CONDITION, AS_WRITTEN), tuple(design.conditions)
@@ -353,9 +353,9 @@ def conditions_of(study: Study, participant: str, group: str, place: int) -> tup
 
 
 def slot_by_name(participant: str) -> int:
-    """Return the slot that a pseudonym would have if all came in order: 7 for ``P007``.
+    """Return the slot that follows from a pseudonym's number: 7 for ``P007``.
 
-    For plans, pilots and simulations, which have no place in the register.
+    For plans, pilots and simulations, which have no slot in the register.
     """
     digits = re.search(r"\d+$", participant)
     return max(1, int(digits[0])) if digits else 1
@@ -364,7 +364,7 @@ def slot_by_name(participant: str) -> int:
 def plan_session(
     study: Study, participant: str, session: int, slot: int | None = None
 ) -> SessionPlan:
-    """Return what happens in ``session`` (from 1) of ``participant``.
+    """Return the plan of ``session`` (from 1) of ``participant``.
 
     ``slot`` is the participant's in the register; without it, the one of the pseudonym's number.
     """

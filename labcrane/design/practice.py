@@ -1,4 +1,4 @@
-"""Practice: whether it has been enough."""
+"""Practice: when its criterion is met."""
 
 from labcrane.core.records import Phase, Value
 from labcrane.design.plan import PlannedBlock
@@ -12,7 +12,7 @@ class WarmUp:
     over
         Whether no more of the practice is needed.
     streak
-        How many in a row have succeeded.
+        Number of successes in a row.
     """
 
     def __init__(self) -> None:
@@ -21,7 +21,7 @@ class WarmUp:
         self._number = 0
 
     def begin(self, block: PlannedBlock) -> bool:
-        """Return whether ``block`` is to be run; a further round is not, once practice is over."""
+        """Return whether to run ``block``; further rounds are not, once practice is over."""
         if block.until is None or self._number == 0:
             self.streak = block.streak  # of before the session stopped; it counts on
             self.over = block.until is not None and self.streak >= block.until.successes
@@ -32,7 +32,7 @@ class WarmUp:
         return wanted
 
     def count(self, block: PlannedBlock, outcome: Phase) -> None:
-        """Take note of a counted trial."""
+        """Count a trial."""
         if block.until is not None and outcome is not Phase.REPEATED:
             self.streak = self.streak + 1 if outcome is Phase.SUCCESS else 0
             self.over = self.over or self.streak >= block.until.successes

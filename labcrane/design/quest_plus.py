@@ -1,7 +1,7 @@
-"""QUEST+: the level whose answer is expected to tell most of the threshold (Watson 2017).
+"""QUEST+: the level with the highest expected information on the threshold (Watson 2017).
 
-Our own sixty lines: the library that there is loads for seconds and takes two ticks of a loop for a
-choice. The tests compare the two.
+The existing library takes seconds to load and two ticks of a loop for a choice, so this is an
+implementation of our own. The tests compare the two.
 """
 
 import math
@@ -15,24 +15,24 @@ from labcrane.protocol.tracks import THRESHOLDS, QuestPlus
 from labcrane.types import FloatArray
 
 SURE = 1e-12
-"""Nothing is surer than this: an impossible answer must not leave a posterior of zeros."""
+"""Limit of certainty: an impossible answer must not leave a posterior of zeros."""
 
 DIGITS = 9
-"""To which entropies are compared, so that sums in another order choose the same level."""
+"""Precision of comparing entropies, so that sums in another order choose the same level."""
 
 
 GRIDS = 1024
-"""That are kept, some kB each: more than the tracks of any study, so that none is made twice."""
+"""Number of cached grids, some kB each: more than any study's tracks, so none is made twice."""
 
 
 @dataclass(frozen=True, slots=True)
 class Posterior:
-    """What is known of a participant.
+    """The estimate of a participant's threshold.
 
     Attributes
     ----------
     best
-        Number of the level that is expected to tell most.
+        Number of the level with the highest expected information.
     mean, sd
         Of the threshold, in the levels' unit.
     """
@@ -43,12 +43,12 @@ class Posterior:
 
 
 class Grid:
-    """Every threshold with every spread, and what each says of each level.
+    """Every threshold with every spread, and the probabilities of each at each level.
 
     Parameters
     ----------
     levels
-        How hard each level is, shape ``(n_levels,)``.
+        Difficulty of each level, shape ``(n_levels,)``.
     """
 
     def __init__(self, settings: QuestPlus, levels: Sequence[float]) -> None:
@@ -68,7 +68,7 @@ class Grid:
         return list(zip(self.thresholds.tolist(), spreads.tolist(), strict=True))
 
     def posterior(self, successes: FloatArray, failures: FloatArray) -> Posterior:
-        """Return what is known after so many successes and failures at each level.
+        """Return the estimate after numbers of successes and failures at each level.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Random sequences in which no level comes more than so often in a row."""
+"""Random sequences with a limit of repetitions of a level in a row."""
 
 import random
 from bisect import bisect_right, insort
@@ -14,14 +14,14 @@ has."""
 
 
 class Ways:
-    """How many ways there are to go on, with no level more than ``most`` times in a row."""
+    """The number of continuations, with no level more than ``most`` times in a row."""
 
     def __init__(self, most: int) -> None:
         self._most = most
         self._known: dict[State, int] = {}
 
     def count(self, state: State) -> int:
-        """Return the ways to go on from a state; without recursion, which so many levels exceed."""
+        """Return a state's number of continuations; without recursion, which many levels exceed."""
         known = self._known
         waiting = [] if state in known else [(state, self._nexts(state))]
         while waiting:
@@ -35,7 +35,7 @@ class Ways:
         return known[state]
 
     def _nexts(self, state: State) -> list[tuple[State, int]]:
-        """Return what can follow, and by how many levels it does."""
+        """Return the possible next states, and the number of levels for each."""
         others, left, run = state
         found = [((others, left - 1, run + 1), 1)] if left and run < self._most else []
         at = 0
@@ -52,8 +52,8 @@ class Ways:
 
 @lru_cache(maxsize=4)
 def _ways(most: int, levels: int, times: int) -> Ways:
-    """Return what is counted for every participant's order alike."""
-    del levels, times  # another design counts anew, so that what is kept does not grow
+    """Return the counts that are the same for every participant's order."""
+    del levels, times  # another design counts again, so that the cache does not grow
     return Ways(most)
 
 
@@ -61,7 +61,7 @@ def sequence(levels: Sequence[str], times: int, most: int, seed: int) -> tuple[s
     """Return each level ``times`` times, none more than ``most`` times in a row.
 
     Every allowed sequence is equally likely: at each place a level is drawn with the exact number
-    of ways to go on after it as its weight.
+    of continuations as its weight.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Slots: places in the design, each of one participant at a time.
 
-A slot says the between-subject group and the row of every square. Whoever drops out leaves a slot
-to the next one who comes, so that groups stay equal.
+A slot determines the between-subject group and the row of every square. A participant who drops out
+releases the slot for the next one, so that groups stay equal.
 """
 
 from collections import Counter
@@ -36,7 +36,7 @@ def place_of(groups: Sequence[str], slot: int) -> int:
 def next_slot(study: str, groups: Sequence[str], taken: Collection[int]) -> int:
     """Return the slot of the next participant: a free one, of the smallest group, the first such.
 
-    Slots are handed out in order, so that free ones among them were left by someone.
+    Slots are handed out in order, so free ones among them were released.
     """
     last = max(taken, default=0)
     free = [slot for slot in range(1, last + 1) if slot not in taken] or [last + 1]

@@ -1,6 +1,6 @@
-"""Tracks: which level comes next, from what the participant has done and nothing else.
+"""Tracks: the next level, from the participant's responses alone.
 
-A track keeps no state of its own. Its next level is worked out from the responses in the record,
+A track keeps no state of its own. Its next level is computed from the responses in the record,
 by the same function in a session, after a kill, in the next session, and in a replay.
 """
 
@@ -17,17 +17,17 @@ from labcrane.errors import ProtocolError
 from labcrane.protocol.tracks import Track
 
 TRACK, LEVEL, SUCCESS = "track", "track_level", "track_success"
-"""Columns of the trial table: which track, the level that it chose, whether that was a success."""
+"""Columns of the trial table: the track, the level that it chose, and the success."""
 
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """What a trial told a track.
+    """Response of a trial for a track.
 
     Attributes
     ----------
     success
-        None where it tells nothing, as an approach or a trial that was skipped.
+        None without information, as for an approach movement or a skipped trial.
     """
 
     track: str
@@ -36,7 +36,7 @@ class Response:
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> "Response | None":
-        """Return that of a row of the trial table; None without a track."""
+        """Return the response of a row of the trial table; None without a track."""
         if TRACK not in row:
             return None
         success = row.get(SUCCESS)
@@ -45,17 +45,17 @@ class Response:
 
 @dataclass(frozen=True, slots=True)
 class TrackState:
-    """Where a track stands.
+    """State of a track.
 
     Attributes
     ----------
     level
-        The next level; None when the block has come to its end.
+        The next level; None at the end of the block.
     estimate, sd
         The threshold and its standard deviation, of a staircase that of its levels at reversals; in
         the levels' unit, NaN where it is not known yet.
     responses
-        How many there are, those of before included.
+        Number of responses, including earlier ones.
     """
 
     level: str | None
@@ -65,7 +65,7 @@ class TrackState:
 
     @property
     def row(self) -> dict[str, Value]:
-        """What the record says of it."""
+        """Its values for the record."""
         known = self.estimate == self.estimate
         return {
             "estimate": self.estimate if known else None,
@@ -78,7 +78,7 @@ class TrackState:
 def standing(
     track: Track, before: Sequence[tuple[str, bool]] = (), own: Sequence[tuple[str, bool]] = ()
 ) -> TrackState:
-    """Return where a track stands.
+    """Return the state of a track.
 
     Parameters
     ----------
@@ -105,12 +105,12 @@ def standing(
 
 @dataclass(frozen=True, slots=True)
 class PlannedTrack:
-    """A block's track: what each of its trials would be at each level.
+    """A block's track: each of its trials at each level.
 
     Attributes
     ----------
     first, count
-        Number of the block's first trial, and how many it has at most.
+        Number of the block's first trial, and the maximum number of trials.
     rounds
         The trials of a round at each level; every level has as many.
     """
@@ -132,35 +132,35 @@ class PlannedTrack:
 
     @property
     def longest_s(self) -> float:
-        """How long a round is likely to take at the level that takes longest, in seconds."""
+        """Expected duration of a round at the longest level, in seconds."""
         return max(sum(each.expected_s for each in trials) for trials in self.rounds.values())
 
     @property
     def counted(self) -> int:
-        """Trials of a round that count, and tell the track something."""
+        """Counted trials of a round, which are responses for the track."""
         return sum(trial.counted for trial in next(iter(self.rounds.values())))
 
     @property
     def described(self) -> dict[str, Any]:
-        """What a recording says of it: the law and how many trials of a round count."""
+        """Its description in a recording: the law and the number of counted trials in a round."""
         return {"settings": self.settings.model_dump(mode="json"), "counted": self.counted}
 
     def at(self, number: int, level: str) -> PlannedTrial | None:
-        """Return what the trial of this number is at a level; None where there is none such."""
+        """Return the trial of this number at a level; None if there is none."""
         trials = self.rounds.get(level)
         return None if trials is None else trials[(number - self.first) % self.size]
 
     def stands(
         self, so_far: Mapping[int, Response], carried: Iterable[Response] = ()
     ) -> TrackState:
-        """Return where it stands.
+        """Return its state.
 
         Parameters
         ----------
         so_far
-            What the session's trials told, by their numbers, in the order in which they ended.
+            Responses of the session's trials, by their numbers, in the order in which they ended.
         carried
-            What trials of earlier sessions told.
+            Responses of trials in earlier sessions.
         """
         own = range(self.first, self.first + self.count)
         earlier = [*carried, *(each for number, each in so_far.items() if number not in own)]
@@ -180,7 +180,7 @@ class PlannedTrack:
     def choose(
         self, trial: Trial, so_far: Mapping[int, Response], carried: Iterable[Response] = ()
     ) -> Trial | None:
-        """Return a trial as its track wants it now; None when the track has come to its end.
+        """Return a trial at the track's present level; None when the track has ended.
 
         A round that is under way keeps its level.
         """
@@ -192,7 +192,7 @@ class PlannedTrack:
 
 
 def plan_rounds(name: str, level: str, trials: Iterable[PlannedTrial]) -> tuple[PlannedTrial, ...]:
-    """Return the trials of a round, with columns that say by which track they are as they are."""
+    """Return the trials of a round, with columns that name their track."""
     return tuple(
         replace(each, condition={**each.condition, TRACK: name, LEVEL: level}) for each in trials
     )
@@ -211,5 +211,5 @@ def check_carried(tracks: Mapping[str, Track], carried: Iterable[Response]) -> N
             raise ProtocolError(
                 f"track {each.track!r} goes on from an earlier session, which had its level "
                 f"{each.level!r}, and it has {', '.join(tracks[each.track].levels)}; give it back, "
-                "or begin anew with carry: false"
+                "or start again with carry: false"
             )

@@ -9,26 +9,26 @@ import numpy as np
 from labcrane.protocol.tracks import UpDown
 
 FEWEST = 2
-"""Levels at reversals that make an estimate."""
+"""Number of levels at reversals in an estimate."""
 
 
 @dataclass(frozen=True, slots=True)
 class Staircase:
-    """Where a staircase stands.
+    """State of a staircase.
 
     Attributes
     ----------
     level
         The next level.
     turns
-        How hard the levels were at which its direction changed, in the last block.
+        Difficulties of the levels at its reversals, in the last block.
     """
 
     level: str
     turns: tuple[float, ...]
 
     def estimate(self, settings: UpDown) -> tuple[float, float]:
-        """Return mean and standard deviation of the levels at reversals; NaN of fewer than two."""
+        """Return mean and standard deviation of the levels at reversals; NaN for fewer than two."""
         kept = self.turns[settings.leave_out :]
         if len(kept) < FEWEST:
             return float("nan"), float("nan")
@@ -42,18 +42,18 @@ def climb(
     responses: Sequence[tuple[str, bool]],
     before: int = 0,
 ) -> Staircase:
-    """Return where a staircase stands after some responses.
+    """Return the state of a staircase after some responses.
 
-    At the hardest and the easiest level it stays where it cannot go on; that is no reversal.
+    At the hardest and the easiest level it stays where it cannot go on; that is not a reversal.
 
     Parameters
     ----------
     levels
-        How hard each is.
+        Difficulty of each.
     responses
         The level of each trial and whether it was a success, in order.
     before
-        How many of them were before the block whose reversals are counted.
+        Number of them before the block whose reversals are counted.
     """
     names = sorted(levels, key=levels.__getitem__)
     place = {name: at for at, name in enumerate(names)}

@@ -1,4 +1,4 @@
 """Checks of a computer before a study day.
 
-In comes a protocol, or none; out go findings: what is well, what is not, what to do.
+Input: a protocol, or none. Output: findings with verdicts and remedies.
 """

@@ -1,7 +1,7 @@
 """Process of its own for every examination: one that hangs or crashes is a finding.
 
-A folder on a server that does not answer, a driver that stands still, a library that takes its
-process with it: the doctor says what did so, and where, and goes on.
+If a server's folder does not answer, a driver hangs, or a library crashes its process, the doctor
+reports what did so, and where, and continues.
 """
 
 import faulthandler
@@ -25,39 +25,39 @@ from labcrane.processes.parent import Parent
 MODULE = "labcrane.doctor.apart"
 
 WAIT_S = 30.0
-"""How long an examination may take."""
+"""Time limit of an examination."""
 
 START_S = 60.0
-"""How much longer a process may take that has to start first, on a busy computer too."""
+"""Additional time for the start of its process, on a busy computer too."""
 
 END_S = 5.0
-"""How long the doctor waits for the end of a process that it has killed; none can be that waits
-for a disk without an end."""
+"""How long the doctor waits for the end of a killed process; a process that waits for a disk may
+never end."""
 
 TIMEOUT = "Timeout ("
-"""How faulthandler begins when the time of an examination is over."""
+"""First words of faulthandler's output at the end of an examination's time."""
 
 Tell = Callable[[str], None]
 
 
 class Examination(Protocol):
-    """What can be examined in another process: it is pickled."""
+    """An examination for another process: it is pickled."""
 
     @property
     def what(self) -> str:
-        """What is looked at, for ``looking at ... did not answer``."""
+        """What is examined, for ``examining ... did not answer``."""
 
     @property
     def fix(self) -> str:
-        """What to do when it does not answer."""
+        """Remedy if it does not answer."""
 
     def prepared(self) -> Callable[[Tell | None], Iterable[Finding]]:
-        """Get ready, which is not timed; return what examines."""
+        """Prepare, without time limit; return the function that examines."""
 
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """An examination that is a function of a module, and what it is called with."""
+    """An examination by a function of a module, with its arguments."""
 
     what: str
     fix: str
@@ -71,18 +71,18 @@ class Call:
 
 @dataclass(frozen=True, slots=True)
 class ExaminationConfig:
-    """What the process of an examination is told.
+    """Configuration of an examination's process.
 
     Attributes
     ----------
     examination
-        What to do.
+        The examination.
     asks
-        Whether a person is there, who is told what to move.
+        Whether a person is there to move things when asked.
     complaints
-        The file that takes what is written to the standard error.
+        The file for the standard error.
     wait_s
-        How long the examination may take.
+        Time limit of the examination.
     """
 
     examination: Examination
@@ -99,11 +99,11 @@ def examine(
     Parameters
     ----------
     examination
-        What to do; it is pickled.
+        The examination; it is pickled.
     wait_s
-        How long it may take, by default ``WAIT_S``.
+        Its time limit, by default ``WAIT_S``.
     asks
-        Whether a person is there, who is told what to move.
+        Whether a person is there to move things when asked.
     """
     # A folder: Windows lets no second process open a temporary file that is open here.
     with tempfile.TemporaryDirectory(prefix="labcrane-doctor-") as folder:
@@ -138,12 +138,12 @@ def _examine(order: ExaminationConfig) -> Sequence[Finding]:
     if TIMEOUT in text:
         return [_fault(examination, f"did not answer within {wait_s:g} s{_stuck(text)}")]
     *_, last = ["", *text.splitlines()]
-    why = f"; the last it said was {last.strip()!r}" if last else ""
+    why = f"; its last output was {last.strip()!r}" if last else ""
     return [_fault(examination, f"ended its process with exit code {code}{why}")]
 
 
 def _taken(process: ProcessHandle) -> Sequence[Finding] | None:
-    """Show what is for the person who moves things; return the findings once they have come."""
+    """Print the instructions for the person; return the findings once they have come."""
     found = None
     for message in process.messages():
         if isinstance(message, str):
@@ -154,23 +154,23 @@ def _taken(process: ProcessHandle) -> Sequence[Finding] | None:
 
 
 def _fault(examination: Examination, what: str) -> Finding:
-    return Finding(Verdict.FAIL, f"looking at {examination.what} {what}", examination.fix)
+    return Finding(Verdict.FAIL, f"examining {examination.what} {what}", examination.fix)
 
 
 FRAME = re.compile(r'^  File "(?P<path>.+)", line (?P<line>\d+) in (?P<name>.+)$', re.MULTILINE)
 
 
 def _stuck(complaints: str) -> str:
-    """Return where an examination has stood still, as faulthandler wrote it at the end of its time.
+    """Return where an examination was stuck, as faulthandler wrote it at the end of its time.
 
-    What hangs is most often a library; which call of the plugin's led there says more.
+    Most often a library hangs; the plugin's call that led there says more.
     """
     *_, main = complaints.rpartition("(most recent call first):")
     calls = list(takewhile(lambda call: not _ours(call["path"]), FRAME.finditer(main)))
     if not calls:
         return ""
     inner, *outer = calls
-    said = f"; it stood still in {inner['name']}() ({Path(inner['path']).name}:{inner['line']})"
+    said = f"; it was stuck in {inner['name']}() ({Path(inner['path']).name}:{inner['line']})"
     here = Path(inner["path"]).parent
     for call in outer:
         if Path(call["path"]).parent != here:
@@ -190,12 +190,12 @@ def main() -> int:
     order: ExaminationConfig | None = parent.order()
     if order is None:
         return 0
-    # Sound libraries fill the terminal with what they did not find; it is kept for a crash.
+    # Sound libraries fill the terminal with messages; they are kept in case of a crash.
     with order.complaints.open("a", encoding="utf-8") as file:
         os.dup2(file.fileno(), sys.stderr.fileno())
     examination = order.examination
     examines = examination.prepared()
-    # Even what hangs in C and lets no Python run is seen by this, and ended.
+    # This detects and ends even code that hangs in C and lets no Python run.
     faulthandler.dump_traceback_later(order.wait_s, exit=True, file=sys.stderr)
     try:
         found = list(examines(parent.tell if order.asks else None))
@@ -207,5 +207,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    # What it sends is unpickled by the name of this module, which is not __main__.
+    # Its findings are unpickled by the name of this module, which is not __main__.
     sys.exit(importlib.import_module(MODULE).main())

@@ -1,4 +1,4 @@
-"""The whole examination of a computer, and the light one at the start of every session."""
+"""The complete examination of a computer, and the short one at the start of every session."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -12,12 +12,12 @@ from labcrane.protocol.study import Study
 from labcrane.registry.registry import Registry
 
 RATE_HZ = 240.0
-"""Ticks a second where no protocol says how many."""
+"""Ticks per second without a protocol."""
 
-OTHERWISE = "end other programs and ask again; if it stays so, send this with a bug report"
+OTHERWISE = "close other programs and run doctor again; if it persists, send this with a bug report"
 UNMOUNTED = "the server or disk that holds it does not answer: mount it again, or give --data"
-UNPLUGGED = "look at the network of this computer, or give --local"
-"""What to do where an examination does not answer."""
+UNPLUGGED = "check the network of this computer, or give --local"
+"""Remedies if an examination does not answer."""
 
 
 def examine(
@@ -36,9 +36,9 @@ def examine(
     data
         The data folder; it need not exist.
     study
-        What is needed; None looks at everything.
+        The study that is checked; None checks everything.
     needed_bytes
-        Space that a session takes.
+        Space that a session needs.
     peers
         Other computers whose streams are needed, by name or address.
     move
@@ -62,32 +62,32 @@ def examine(
 
 
 def directions(study: Study) -> Iterator[Finding]:
-    """Say which way the machine goes, so that who moves the controls can tell it is meant."""
+    """Print the directions of the machine, so that the person at the controls can check them."""
     said = study.scheme.settings.directions(study.machine)
     return (Finding(Verdict.PASS, text) for text in said)
 
 
 def left_out(registry: Registry, study: Study | None) -> Sequence[str]:
-    """Return what is not looked at, and how it would be."""
+    """Return what is not checked, and how to check it."""
     return () if study else components.of_everything(registry)[1]
 
 
 def keep_apart(found: Diagnosis, data: Path) -> Finding:
-    """Keep a diagnosis in the data folder; a folder that hangs or takes nothing is a finding."""
+    """Store a diagnosis in the data folder; a folder that hangs or is not writable is a finding."""
     (finding,) = apart.examine(apart.Call(f"folder {data}", UNMOUNTED, _keep, (found, data)))
     return finding
 
 
 def _keep(found: Diagnosis, data: Path) -> Iterator[Finding]:
-    text = f"kept in {keep(found, data)}: sessions within a day have it in their record"
+    text = f"saved in {keep(found, data)}: sessions within a day include it in their records"
     yield Finding(Verdict.PASS, text)
 
 
 def at_start(data: Path) -> dict[str, Any]:
-    """Return what a session's record holds of the computer, ready for JSON.
+    """Return the facts on the computer for a session's record, ready for JSON.
 
-    What can be seen without making anybody wait, and the last diagnosis of this computer when it
-    was made within a day.
+    They are facts that take no time to check, and this computer's last diagnosis if it was made
+    within a day.
     """
     checks = [
         *_checks("clock", clock.light()),

@@ -1,6 +1,6 @@
-"""Clock examination: how fine it is, what drives it, and whether NTP bends it.
+"""Clock examination: its resolution, its source, and whether NTP slews it.
 
-Time stamps are on the monotonic clock. A step of the wall clock does not touch it, but while NTP
+Timestamps are on the monotonic clock. A step of the wall clock does not affect it, but while NTP
 slews, it runs fast or slow by up to 500 ppm, and other computers see that as drift.
 """
 
@@ -13,7 +13,7 @@ from typing import NamedTuple
 from labcrane.core.findings import Finding, Verdict
 
 FINE_S = 1e-6
-"""Step of the clock up to which it is fine; a tick at 1 kHz is a thousand of them."""
+"""Maximum step of a good clock; a tick at 1 kHz is a thousand of them."""
 
 COARSE_S = 1e-4
 GOOD_SOURCES = ("tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page", "xen")
@@ -23,7 +23,7 @@ SLEW_PPM = 100.0
 """Rate of the monotonic clock against the hardware beyond which NTP is still settling."""
 
 STEP_S = 0.005
-"""Change of the wall clock against the monotonic one that is no slew."""
+"""Change of the wall clock against the monotonic one that is a step, not a slew."""
 
 WATCH_S = 1.0
 
@@ -54,14 +54,14 @@ def _read() -> tuple[float, ClockReading]:
 
 
 def light() -> list[Finding]:
-    """Return what can be seen at once."""
+    """Return the findings that need no measurement."""
     return [_resolution(), *_source(SOURCE)]
 
 
 def examine(
     clocks: Callable[[], ClockReading] = read, wait: Callable[[float], None] = time.sleep
 ) -> list[Finding]:
-    """Return how the clock is, after a look of a second at what NTP does to it."""
+    """Return the findings on the clock, after watching NTP's effect on it for a second."""
     before = clocks()
     wait(WATCH_S)
     return [*light(), *_bent(before, clocks())]
@@ -88,7 +88,7 @@ def _source(path: Path) -> list[Finding]:
     name = path.read_text(encoding="utf-8").strip()
     if name.startswith(GOOD_SOURCES):
         return [Finding(Verdict.PASS, f"the clock source is {name}")]
-    fix = "look into the kernel's log why it gave up tsc (dmesg | grep -i clocksource)"
+    fix = "check the kernel's log for why it dropped tsc (dmesg | grep -i clocksource)"
     return [Finding(Verdict.WARN, f"the clock source is {name}, which is slow to read", fix)]
 
 
@@ -102,9 +102,9 @@ def _bent(before: ClockReading, after: ClockReading) -> list[Finding]:
         found.append(Finding(Verdict.PASS, slew))
     else:
         fix = "NTP is slewing: wait until it has settled (chronyc tracking, timedatectl)"
-        found.append(Finding(Verdict.WARN, f"{slew}, which others see as drift", fix))
+        found.append(Finding(Verdict.WARN, f"{slew}, which other computers see as drift", fix))
     if abs(step) > STEP_S:
-        text = f"the wall clock was set by {step:+.3f} s while it was watched"
-        fix = "time stamps are not touched; wait before you compare them with times of day"
+        text = f"the wall clock was set by {step:+.3f} s during the check"
+        fix = "timestamps are not affected; wait before you compare them with times of day"
         found.append(Finding(Verdict.WARN, text, fix))
     return found

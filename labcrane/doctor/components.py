@@ -1,6 +1,6 @@
-"""The hardware of components, looked at by the plugins that know it.
+"""The hardware of components, examined by their plugins.
 
-Each look is made in a process of its own: a driver that crashes or hangs is a finding.
+Each examination runs in a process of its own: a driver that crashes or hangs is a finding.
 """
 
 import pickle
@@ -20,25 +20,25 @@ from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.registry import Registry, discover
 
 MOVING = 10.0
-"""How many times as long a look may take with a person who moves things."""
+"""Factor of the time limit with a person who moves things."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExaminedPart:
-    """What is to be looked at.
+    """A part to examine.
 
     Attributes
     ----------
     area
-        What the researcher calls it: ``view operator``.
+        Its name for researchers: ``view operator``.
     role
-        The researcher's word for the component's role.
+        The word of protocols for the component's role.
     name
         The component's name.
     settings
-        As the protocol has them.
+        Those of the protocol.
     study
-        The protocol, beside which there may be plugins.
+        The protocol, whose folder may contain plugins.
     """
 
     area: str
@@ -50,36 +50,38 @@ class ExaminedPart:
 
 @dataclass(frozen=True, slots=True)
 class PackedLook:
-    """A look on its way to another process.
+    """An examination for another process.
 
     Attributes
     ----------
     what
-        What is looked at, in words.
+        What is examined, in words.
     look
         Pickled: it can be read when the study's own plugins are there.
     study
-        The protocol, beside which there may be plugins.
+        The protocol, whose folder may contain plugins.
     """
 
     what: str
     look: bytes
     study: Path | None
 
-    fix: ClassVar = "look at its driver, or tell the plugin's author"
+    fix: ClassVar = "check its driver, or report it to the plugin's author"
 
     def prepared(self) -> Callable[[apart.Tell | None], Iterable[Finding]]:
         """Load the plugins; return what examines."""
         registry = discover(study=self.study)
-        look: ExaminedPart = pickle.loads(self.look)  # noqa: S301 - of whoever started this process
+        look: ExaminedPart = pickle.loads(self.look)  # noqa: S301 - from the process that started this one
         (role,) = (role for role, entry in ROLES.items() if entry.word == look.role)
         examines = registry.offers[role][look.name].examine
         assert examines is not None  # noqa: S101 - why it is looked at
-        return partial(examines, look.settings)  # no call of ours between a look and its timer
+        return partial(
+            examines, look.settings
+        )  # no call of ours between an examination and its timer
 
 
 def of_study(study: Study, registry: Registry) -> list[ExaminedPart]:
-    """Return the looks that a study needs; ``registry`` is the one it was loaded with."""
+    """Return the examinations that a study needs; ``registry`` is the one it was loaded with."""
     chosen = {
         f"input {study.input.name}": study.input,
         **{f"feedback {name}": choice for name, choice in (study.cues | study.sounds).items()},
@@ -98,7 +100,7 @@ def of_study(study: Study, registry: Registry) -> list[ExaminedPart]:
 
 
 def of_everything(registry: Registry) -> tuple[list[ExaminedPart], list[str]]:
-    """Return the looks at everything installed, and what needs a protocol to be looked at."""
+    """Return the examinations of everything installed, and what needs a protocol for one."""
     looks, left_out = [], []
     for role, offers in registry.offers.items():
         for name, offer in sorted(offers.items()):
@@ -113,7 +115,7 @@ def of_everything(registry: Registry) -> tuple[list[ExaminedPart], list[str]]:
 
 
 def examine(look: ExaminedPart, *, move: bool) -> Sequence[Finding]:
-    """Return what the plugin finds; ``move`` when a person is there to move things."""
+    """Return the plugin's findings; ``move`` if a person is there to move things."""
     wait_s = apart.WAIT_S * (MOVING if move else 1.0)
     packed = PackedLook(f"{look.role} {look.name!r}", pickle.dumps(look), look.study)
     return apart.examine(packed, wait_s=wait_s, asks=move)

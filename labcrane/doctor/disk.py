@@ -1,4 +1,4 @@
-"""Disk examination: whether it takes what a session writes, in time, and keeps it."""
+"""Disk examination: whether it stores a session's data in time and reliably."""
 
 import os
 import shutil
@@ -16,14 +16,14 @@ from labcrane.files.system import PRIVATE_MODES
 from labcrane.streams.sync.report.limits import WarnLimit
 
 NEEDED_BYTES = 1_000_000_000
-"""Free space that is asked for where no protocol says how much a session takes."""
+"""Required free space without a protocol."""
 
 BLOCK_BYTES, BLOCKS, RATE_HZ = 512, 240, 240.0
 WRITE_S = WarnLimit(0.001, 0.004)
-"""99th percentile of a write, which happens within a tick."""
+"""Limit of a write's 99th percentile; a write happens within a tick."""
 
 SYNC_S = WarnLimit(0.2, 1.0)
-"""Time to bring a second of recording to the disk; a power cut takes what is not there yet."""
+"""Limit of the time to sync a second of recording; a power cut loses data not yet synced."""
 
 MOUNTS = Path("/proc/self/mounts")
 REMOTE = ("nfs", "cifs", "smb", "fuse.sshfs", "9p", "ceph")
@@ -31,13 +31,13 @@ VOLATILE = ("tmpfs", "ramfs")
 
 
 def light(folder: Path, needed: float = NEEDED_BYTES) -> list[Finding]:
-    """Return what can be seen at once: free space, the kind of file system, who may read."""
+    """Return the findings that need no measurement: free space, file system, access rights."""
     place = existing(folder)
     return [_space(place, needed), *_kind(place), *_privacy(place)]
 
 
 def examine(folder: Path, needed: float = NEEDED_BYTES) -> list[Finding]:
-    """Write for a second as a session's journal is written, and say how long it took."""
+    """Write like a session's journal for a second, and report how long it took."""
     return [*light(folder, needed), *_speed(existing(folder))]
 
 
@@ -82,11 +82,11 @@ def file_system(place: Path, mounts: str) -> str:
 def _privacy(place: Path) -> list[Finding]:
     if PRIVATE_MODES:  # every file is written for this user only, wherever it is
         return []
-    text = f"who may read what is written at {place} is for its access list to say"
+    text = f"the access list of {place} determines who may read files there"
     if place.is_relative_to(Path.home()):
-        return [Finding(Verdict.PASS, f"{text}, and this user's own folders keep others out")]
+        return [Finding(Verdict.PASS, f"{text}, and folders of this user are closed to others")]
     fix = f'icacls "{place}" /inheritance:r /grant:r "%USERNAME%:(OI)(CI)F"'
-    return [Finding(Verdict.WARN, f"{text}: it may be everybody on this computer", fix)]
+    return [Finding(Verdict.WARN, f"{text}, possibly everybody on this computer", fix)]
 
 
 def _speed(place: Path) -> list[Finding]:
@@ -100,13 +100,15 @@ def _speed(place: Path) -> list[Finding]:
     text = f"a frame is written in {1e3 * most:.3f} ms (p99), {1e3 * worst:.3f} ms (most)"
     synced = f"a second of recording is on the disk after {1e3 * sync:.0f} ms"
     return [
-        _judged(text, WRITE_S.judge(most), "another disk, or fewer programs that write"),
-        _judged(synced, SYNC_S.judge(sync), "another disk: a power cut would lose that much more"),
+        _judged(text, WRITE_S.judge(most), "use another disk, or run fewer programs that write"),
+        _judged(
+            synced, SYNC_S.judge(sync), "use another disk: a power cut would lose that much more"
+        ),
     ]
 
 
 def _timed(path: Path) -> tuple[np.ndarray, float]:
-    """Return how long each write took, and the sync after them, in s."""
+    """Return the times of each write, and of the sync after them, in s."""
     block, took = os.urandom(BLOCK_BYTES), np.empty(BLOCKS)
     file = AppendFile(path, sync_s=10.0)  # none of its own in between
     try:

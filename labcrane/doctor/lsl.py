@@ -1,7 +1,7 @@
-"""LSL examination: a stream that is missing is told apart from one that is blocked.
+"""LSL examination: it distinguishes missing streams from blocked ones.
 
-A stream is announced over UDP, described and sent over TCP, and its clock is asked over UDP
-again; a firewall can stop each alone. The first look is at a stream of our own.
+A stream is announced over UDP, described and sent over TCP, and its clock is queried over UDP
+again; a firewall can block each separately. A test stream is examined first.
 """
 
 import os
@@ -23,7 +23,7 @@ FIRST_PORT, PORTS = 16571, 34
 """liblsl's default: 16571 for discovery, and 16572 to 16604 for streams."""
 
 ENOUGH_PORTS, FEWEST_PORTS = 20, 8
-"""Ports that a run with page, recorders and three views takes; and the session alone."""
+"""Ports that a run with page, recorders and three views uses; and the session alone."""
 
 LOOK_S, LONGER_S = 2.0, 10.0
 ANSWER_S = 1.5
@@ -33,7 +33,7 @@ OPEN_PORTS = "allow UDP 16571 and TCP and UDP 16572 to 16604, inbound and outbou
 
 
 def examine(requests: Sequence[StreamRequest] = ()) -> list[Finding]:
-    """Look for a stream of our own, those that a study needs, and trouble with any other."""
+    """Search for a test stream and the streams of a study, and report trouble with any other."""
     import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
 
     room = ports_finding(free_ports(), len(port_range()))
@@ -52,7 +52,7 @@ def examine(requests: Sequence[StreamRequest] = ()) -> list[Finding]:
 
 
 def ports_finding(free: int, of: int) -> Finding:
-    """Say whether a run finds enough free ports of liblsl's range."""
+    """Report whether enough ports of liblsl's range are free for a run."""
     text = f"{free} of LSL's {of} ports are free"
     if free >= ENOUGH_PORTS:
         return Finding(Verdict.PASS, text)
@@ -65,16 +65,16 @@ def ports_finding(free: int, of: int) -> Finding:
 
 
 def _self_test(own: Sequence[FoundStream]) -> Finding:
-    fix = f"the firewall of this computer stops it: {OPEN_PORTS}"
+    fix = f"the firewall of this computer blocks it: {OPEN_PORTS}"
     if not own:
-        return Finding(Verdict.FAIL, "a stream of our own is not found (UDP 16571)", fix)
+        return Finding(Verdict.FAIL, "a test stream is not found (UDP 16571)", fix)
     if own[0].warnings and (blocked := _blocked(own[0])):
-        return Finding(Verdict.FAIL, f"a stream of our own {blocked}", fix)
-    return Finding(Verdict.PASS, f"a stream of our own is found and answers; {describe()}")
+        return Finding(Verdict.FAIL, f"a test stream {blocked}", fix)
+    return Finding(Verdict.PASS, f"a test stream is found and answers; {describe()}")
 
 
 def _blocked(one: FoundStream) -> str:
-    """Return what of a stream does not get through, in words; empty when all does."""
+    """Return which part of a stream is blocked, in words; empty if none is."""
     if not one.format:
         return "is announced but does not send its description: TCP is blocked"
     return "" if one.offset_s is not None else "does not answer clock probes: UDP is blocked"
@@ -93,7 +93,7 @@ def _needs(requests: Sequence[StreamRequest], there: Sequence[FoundStream]) -> I
             verdict = Verdict.FAIL if request.required else Verdict.WARN
             fix = (
                 "start its program; if it runs on another computer, labcrane doctor --peer ADDRESS "
-                "tells whether a firewall is in between"
+                "checks for a firewall in between"
             )
             yield Finding(verdict, f"stream {request} is not announced", fix)
         yield from _whose(request, fitting)
@@ -101,7 +101,7 @@ def _needs(requests: Sequence[StreamRequest], there: Sequence[FoundStream]) -> I
             blocked, misfits = _blocked(one), request.misfits(one.channels, one.rate_hz)
             text = f"stream {request} comes from {one.host}"
             if blocked:
-                fix = f"a firewall on {one.host} or here stops it: {OPEN_PORTS}"
+                fix = f"a firewall on {one.host} or here blocks it: {OPEN_PORTS}"
                 yield Finding(Verdict.FAIL, f"{text}, {blocked}", fix)
             elif misfits:
                 fix = "correct the program's settings or the protocol"
@@ -111,20 +111,20 @@ def _needs(requests: Sequence[StreamRequest], there: Sequence[FoundStream]) -> I
 
 
 def _whose(request: StreamRequest, fitting: Sequence[FoundStream]) -> Iterator[Finding]:
-    """Name what fits, where several streams do or any of a type is taken."""
+    """Name the matching streams, where several match or the request is by type only."""
     if request.several or not fitting:
         return
     which = "; ".join(
         f"{one.name!r} (source_id {one.source_id!r}) of {one.host}" for one in fitting
     )
     if request.asks:
-        text = f"stream {request} is asked for by its type alone, and a run asks which is meant: "
-        fix = "write the source_id of the one that is meant in the protocol"
+        text = f"stream {request} is requested by type only, and a run asks for confirmation: "
+        fix = "set the source_id of the right stream in the protocol"
         meant = request.any_meant and len(fitting) == 1
         yield Finding(Verdict.PASS if meant else Verdict.WARN, f"{text}{which}", fix)
     elif len(fitting) > 1:
-        fix = "write the source_id of the one that is meant in the protocol, or several: true"
-        text = f"stream {request} could be any of {len(fitting)}, and no run begins: {which}"
+        fix = "set the source_id of the right stream in the protocol, or several: true"
+        text = f"stream {request} matches {len(fitting)} streams, so no run begins: {which}"
         yield Finding(Verdict.FAIL if request.required else Verdict.WARN, text, fix)
 
 
@@ -135,9 +135,9 @@ def _info(one: FoundStream) -> "pylsl.StreamInfo":
 
 
 def ask_peer(host: str, first_port: int = FIRST_PORT, wait_s: float = ANSWER_S) -> list[Finding]:
-    """Ask a computer for its streams as liblsl does, and say what silence means.
+    """Query a computer for its streams as liblsl does, and explain a missing answer.
 
-    A port on which nobody listens is refused by the other computer; a firewall says nothing.
+    The other computer refuses a port without a listener; a firewall does not answer.
     """
     try:
         address = socket.gethostbyname(host)
@@ -149,10 +149,10 @@ def ask_peer(host: str, first_port: int = FIRST_PORT, wait_s: float = ANSWER_S) 
         return [_reached(host, address, answer) for answer in answers.values()]
     if refused:
         fix = "start the program that sends the stream, on that computer"
-        text = f"{host} is there and lets LSL through, and no program sends a stream there"
+        text = f"{host} is reachable and lets LSL through, but no program sends a stream there"
         return [Finding(Verdict.FAIL, text, fix)]
-    text = f"{host} does not say a word on UDP {first_port} to {first_port + PORTS - 1}"
-    fix = f"if ping {host} is answered, a firewall stops LSL: {OPEN_PORTS}, there and here"
+    text = f"{host} does not answer on UDP {first_port} to {first_port + PORTS - 1}"
+    fix = f"if ping {host} is answered, a firewall blocks LSL: {OPEN_PORTS}, there and here"
     return [Finding(Verdict.FAIL, text, fix)]
 
 
@@ -177,7 +177,7 @@ def _ask(address: str, ports: range, wait_s: float) -> tuple[dict[str, ElementTr
                         continue
                     try:
                         info = ElementTree.fromstring(text.partition("\r\n")[2])  # noqa: S314 - the lab's own network
-                    except ElementTree.ParseError:  # a question of somebody's, or another program
+                    except ElementTree.ParseError:  # another program's query
                         continue
                     answers[info.findtext("uid") or text] = info
         finally:
@@ -199,7 +199,7 @@ def _reached(host: str, address: str, info: ElementTree.Element) -> Finding:
     try:
         socket.create_connection((address, port), ANSWER_S).close()
     except OSError as error:
-        fix = f"a firewall on {host} or here stops it: {OPEN_PORTS}"
+        fix = f"a firewall on {host} or here blocks it: {OPEN_PORTS}"
         text = f"stream {name!r} on {host} is announced, but TCP {port} is not open: {error}"
         return Finding(Verdict.FAIL, text, fix)
     return Finding(Verdict.PASS, f"stream {name!r} on {host} answers on UDP and on TCP {port}")

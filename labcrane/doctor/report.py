@@ -1,4 +1,4 @@
-"""Report of the doctor, and the file that keeps it for the sessions that follow."""
+"""Report of the doctor, and the file that stores it for later sessions."""
 
 import json
 import platform
@@ -16,12 +16,12 @@ FILE = "doctor.json"
 """Name of the file in the study's data folder."""
 
 FRESH = timedelta(hours=24)
-"""Age up to which a diagnosis goes into the record of a session."""
+"""Maximum age of a diagnosis in the record of a session."""
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One line of a diagnosis: what was looked at, and how it is."""
+    """One line of a diagnosis: what was checked, and the finding."""
 
     area: str
     finding: Finding
@@ -29,18 +29,18 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """How a computer was found.
+    """The state of a computer.
 
     Attributes
     ----------
     computer
         Its name on the network.
     made
-        When it was looked at, ISO 8601 with time zone.
+        Time of the check, ISO 8601 with time zone.
     checks
-        In the order in which they were made.
+        The checks, in order.
     left_out
-        What was not looked at, and how it would be.
+        What was not checked, and how to check it.
     """
 
     computer: str
@@ -50,7 +50,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of all."""
+        """The worst verdict."""
         return worst(check.finding.verdict for check in self.checks)
 
     def as_data(self) -> dict[str, Any]:
@@ -76,25 +76,25 @@ def as_data(check: Check) -> dict[str, str]:
 
 
 def diagnosis(checks: Iterable[Check], left_out: Iterable[str] = ()) -> Diagnosis:
-    """Return what was found on this computer, now."""
+    """Return a diagnosis of this computer, made now."""
     made = datetime.now(UTC).isoformat(timespec="seconds")
     return Diagnosis(platform.node(), made, tuple(checks), tuple(left_out))
 
 
 def keep(found: Diagnosis, data: Path) -> Path:
-    """Keep a diagnosis in the study's data folder, and return where."""
+    """Store a diagnosis in the study's data folder, and return its path."""
     path = data / FILE
     write_text(path, json.dumps(found.as_data(), indent=1, ensure_ascii=False) + "\n")
     return path
 
 
 def latest(data: Path, now: datetime | None = None) -> Mapping[str, Any] | None:
-    """Return the diagnosis that was kept, if it is of this computer and of the last 24 hours.
+    """Return the stored diagnosis, if it is of this computer and of the last 24 hours.
 
     Raises
     ------
     RecordingError
-        The file is there and holds no diagnosis.
+        The file exists but contains no diagnosis.
     """
     path = data / FILE
     if not path.is_file():
@@ -105,6 +105,7 @@ def latest(data: Path, now: datetime | None = None) -> Mapping[str, Any] | None:
         same = found["computer"] == platform.node()
     except (ValueError, KeyError, TypeError) as error:
         raise RecordingError(
-            f"{path} holds no diagnosis ({error!r}); run labcrane doctor again, or remove the file"
+            f"{path} contains no diagnosis ({error!r}); run labcrane doctor again, or remove "
+            "the file"
         ) from error
     return found if same and timedelta(0) <= age < FRESH else None

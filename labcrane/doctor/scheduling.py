@@ -16,11 +16,11 @@ SECONDS = 2.0
 CPUS = Path("/sys/devices/system/cpu")
 SLOW_GOVERNORS = ("powersave", "conservative", "schedutil", "ondemand")
 FEW_CORES = 2
-"""Loop, views and sound want a core each; below this they take turns."""
+"""Loop, views and sound need a core each; with fewer they take turns."""
 
 
 def light() -> list[Finding]:
-    """Return what can be seen at once: cores, their governor, and real-time priorities."""
+    """Return the findings that need no measurement: cores, governor, real-time priorities."""
     cores = os.cpu_count() or 1
     if sys.platform == "linux":
         cores = len(os.sched_getaffinity(0))
@@ -33,7 +33,7 @@ def light() -> list[Finding]:
 
 
 def examine(rate_hz: float) -> list[Finding]:
-    """Tick for two seconds as a session does, and say how late that was."""
+    """Tick for two seconds as a session does, and report the lateness."""
     late = lateness(SystemClock(), rate_hz, SECONDS)
     count = len(late)
     share = float(np.mean(late > 1.0 / rate_hz))
@@ -48,7 +48,7 @@ def examine(rate_hz: float) -> list[Finding]:
 
 
 def lateness(clock: Clock, rate_hz: float, seconds: float) -> FloatArray:
-    """Return how late the ticks of an empty loop are here and now, in s, shape ``(n_ticks,)``."""
+    """Return the lateness of an empty loop's ticks, in s, shape ``(n_ticks,)``."""
     count = round(seconds * rate_hz)
     return np.array(
         [tick.woke - tick.due for tick in itertools.islice(ticks(clock, rate_hz), count)]

@@ -9,12 +9,12 @@ ADVICE = "switch off blanking, locking and sleep in the desktop's settings for s
 
 
 def examine() -> Iterator[Finding]:
-    """Ask for the screen to stay awake as a session does, and say who keeps it so."""
+    """Keep the screen awake as a session does, and report which program does it."""
     with wake_lock() as lock:
         if lock.held_by:
             text = f"a session keeps the screen awake by {', '.join(lock.held_by)}"
             yield Finding(Verdict.PASS, text)
             return
-    why = "; ".join(lock.failed) or "no program that could is installed"
-    text = f"the screen may go blank or lock itself in a session: nothing keeps it awake ({why})"
+    why = "; ".join(lock.failed) or "no program that can do so is installed"
+    text = f"the screen may go blank or lock during a session: nothing keeps it awake ({why})"
     yield Finding(Verdict.WARN, text, ADVICE)

@@ -1,4 +1,4 @@
-"""Versions of labcrane and of what it stands on: the lines that a bug report needs."""
+"""Versions of labcrane and its dependencies: the lines that a bug report needs."""
 
 import os
 import platform
@@ -20,7 +20,7 @@ LIBRARIES = (
 """Distributions whose version has explained a fault before."""
 
 GIT_S = 5.0
-"""How long git may take to say which commit it is."""
+"""Time limit of git's answer on the commit."""
 
 
 def versions() -> Sequence[str]:
@@ -40,16 +40,16 @@ def versions() -> Sequence[str]:
         f"computer: {platform.platform()}, {platform.machine()}, {_system()}",
         f"libraries: {libraries}",
         f"{liblsl()}; {configuration()}",
-        f"plugins of others: {', '.join(others) or 'none'}",
+        f"third-party plugins: {', '.join(others) or 'none'}",
     )
 
 
 def commit(root: Path) -> str:
-    """Return which commit a clone is at, and whether files are changed; nothing for no clone."""
+    """Return a clone's commit, and whether files are changed; empty if it is not a clone."""
     if not (root / ".git").exists():  # a folder, or a file in a further working tree
         return ""
     if (git := shutil.which("git")) is None:
-        return ", a clone of which git is not there to tell the commit"
+        return ", a clone; its commit is unknown, since git is not installed"
     command = [
         git,
         "-C",
@@ -65,9 +65,9 @@ def commit(root: Path) -> str:
             command, check=False, capture_output=True, encoding="utf-8", timeout=GIT_S
         )
     except subprocess.TimeoutExpired:
-        return f", a clone of which git did not tell the commit within {GIT_S:g} s"
+        return f", a clone; its commit is unknown, since git did not answer within {GIT_S:g} s"
     if done.returncode:
-        return f", a clone of which git does not tell the commit ({done.stderr.strip()})"
+        return f", a clone; its commit is unknown ({done.stderr.strip()})"
     return f", commit {done.stdout.strip()}"
 
 
@@ -84,10 +84,10 @@ def liblsl() -> str:
 
 
 def configuration() -> str:
-    """Return which configuration liblsl is told of, and whether it is there."""
+    """Return which configuration file liblsl is given, and whether it exists."""
     if not (name := os.environ.get(VARIABLE)):
         return f"{VARIABLE} is not set, liblsl looks for lsl_api.cfg itself"
-    return f"{VARIABLE} is {name}{'' if Path(name).is_file() else ', which is not there'}"
+    return f"{VARIABLE} is {name}{'' if Path(name).is_file() else ', which does not exist'}"
 
 
 def _version(name: str) -> str:

@@ -28,28 +28,28 @@ class ComponentConfig:
 
 @dataclass(frozen=True)
 class FeedbackConfig:
-    """What a feedback process is told.
+    """Configuration of a feedback process.
 
     Attributes
     ----------
     name
         The protocol's name for it.
     part, cues
-        What it runs, and which cues it draws, by the protocol's names.
+        The component, and the cues that it draws, by the protocol's names.
     run
-        What is presented.
+        The run that it presents.
     source
         Whose streams it follows (:attr:`labcrane.session.session.Visit.source`).
     study
-        The protocol, beside which there may be plugins.
+        The protocol, whose folder may contain plugins.
     always
         Whether it presents every frame, or only those of trials in which it is switched on.
     measured
-        What was measured of its delay, if anything was.
+        Its measured delay, if there is one.
     recorded
         Whether there is a recorder, without which it presents nothing; a preview has none.
     title
-        What a window of it is called: its name, and the study's.
+        Title of its window: its name, and the study's.
     before
         The displays that come before it in the protocol: windows lie beside theirs.
     streams
@@ -70,12 +70,12 @@ class FeedbackConfig:
     streams: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> str:
-        """Return the order as one line."""
+        """Return the configuration as one line."""
         return _codec().dump_json(self).decode()
 
     @classmethod
     def from_json(cls, text: str) -> "FeedbackConfig":
-        """Return the order that :meth:`as_json` wrote."""
+        """Return the configuration that :meth:`as_json` wrote."""
         return _codec().validate_json(text)
 
 

@@ -14,26 +14,26 @@ from labcrane.errors import DeviceError
 from labcrane.types import FloatArray
 
 EARLY_S = 0.02
-"""How long before a change its edge may be: sensors are stamped only so well."""
+"""How long before a change its edge may be: the accuracy of sensors' timestamps."""
 
 QUIET_S = 0.05
 """Silence after which a sound counts as a new one."""
 
 FEWEST = 0.9
-"""Share of the changes that must have been seen."""
+"""Minimum share of the changes that the sensor saw."""
 
 CONTRAST = 6.0
-"""A sensor's two levels are this many times farther apart than it wavers."""
+"""Minimum distance of a sensor's two levels, in multiples of its noise."""
 
 PIECE_S, SOUND = 0.01, 3.0
-"""Sound is cut into pieces this long; loud ones are so many times louder than quiet ones."""
+"""Length of sound chunks; loud chunks are so many times louder than quiet ones."""
 
 Kind = Literal["display", "audio"]
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One change of what is presented: when it was recorded, and whether to bright or loud."""
+    """One presented change: its recorded time, and whether it is to bright or loud."""
 
     time: float
     up: bool
@@ -50,7 +50,7 @@ class Delay:
     seen, asked
         How many changes the sensor saw, and how many there were.
     sensor_hz
-        Samples of the sensor per second; nothing is known more finely than one of them.
+        Samples of the sensor per second; a sample is the resolution of the delay.
     """
 
     mean_s: float
@@ -63,12 +63,12 @@ class Delay:
 
 
 def steps(times: FloatArray, values: FloatArray) -> list[Change]:
-    """Return where a signal with two levels goes from one to the other.
+    """Return the times at which a signal changes between its two levels.
 
     Parameters
     ----------
     times, values
-        The sensor's samples, in seconds and whatever it measures in, shape ``(n_samples,)``.
+        The sensor's samples, in seconds and in its own unit, shape ``(n_samples,)``.
 
     Raises
     ------
@@ -81,8 +81,8 @@ def steps(times: FloatArray, values: FloatArray) -> list[Change]:
     wavers = max((float(np.std(half)) for half in halves if len(half)), default=0.0)
     if not high - low > CONTRAST * wavers:
         raise DeviceError(
-            f"the sensor's signal has no two levels: most of it is between {low:g} and {high:g}, "
-            f"and it wavers by {wavers:g}; put the photodiode on the square, and shade it"
+            f"the sensor's signal does not have two levels: most of it is between {low:g} and "
+            f"{high:g}, and it wavers by {wavers:g}; put the photodiode on the square, and shade it"
         )
     near, found = 0.2 * (high - low), []
     bright = bool(values[0] > middle)

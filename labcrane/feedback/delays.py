@@ -1,4 +1,4 @@
-"""Measured delays of views and sounds, in a file beside the protocol."""
+"""Measured delays of views and sounds, in a file in the protocol's folder."""
 
 import json
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ Facts = Mapping[str, float | int | str | bool | None]
 
 @dataclass(frozen=True, slots=True)
 class MeasuredDelay:
-    """A delay, and what it holds for.
+    """A delay, and the facts for which it is valid.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class MeasuredDelay:
     sensor
         Name of the stream that saw it.
     facts
-        What the component said of itself: renderer, size, driver, block.
+        Facts that the component reported: renderer, size, driver, block.
     """
 
     kind: Kind
@@ -41,12 +41,12 @@ class MeasuredDelay:
 
 
 def delay_path(protocol: Path) -> Path:
-    """Return where the delays of a protocol's views and sounds are."""
+    """Return the path of the delays of a protocol's views and sounds."""
     return protocol.with_name(f"{protocol.stem}.delays.json")
 
 
 def read_delays(protocol: Path) -> dict[str, MeasuredDelay]:
-    """Return what was measured, by the protocol's names for views and sounds.
+    """Return the measured delays, by the protocol's names for views and sounds.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def store(protocol: Path, name: str, measured: MeasuredDelay) -> Path:
 
 
 def delay_in_words(measured: MeasuredDelay | None, facts: Facts) -> str:
-    """Return what is known of the delay of a component with these facts."""
+    """Return the known delay of a component with these facts, in words."""
     if measured is None:
         return NOT_MEASURED
     now = {name: value for name, value in facts.items() if name != "delay"}

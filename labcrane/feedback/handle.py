@@ -1,4 +1,4 @@
-"""Handle of one feedback process, which is kept running as the protocol says."""
+"""Handle of one feedback process, which is kept running as the protocol specifies."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -14,13 +14,13 @@ READY_S = 60.0
 """How long a feedback process may take until it is ready: windows and sound servers are slow."""
 
 SILENT_S = 3.0
-"""A process that has not been heard of for so long hangs, and is killed."""
+"""A process that has not reported for so long hangs, and is killed."""
 
 STOP_S = 5.0
 """How long it may take to stop when told to."""
 
 ATTEMPTS = 3
-"""After so many starts in a row without one frame presented, it is left out."""
+"""After so many starts in a row without a presented frame, it is left out."""
 
 
 class FeedbackHandle:
@@ -31,7 +31,7 @@ class FeedbackHandle:
     given_up
         Whether it has been left out.
     facts
-        What it has said of itself since it is ready: renderer, device, delay.
+        Facts that it reports once it is ready: renderer, device, delay.
     presented
         How many frames the present process has presented.
     sends
@@ -69,7 +69,7 @@ class FeedbackHandle:
 
     @property
     def failure(self) -> str | None:
-        """Return why the present process is of no use, in words; None while all is well."""
+        """Return why the present process failed, in words; None while all is well."""
         why = self._process.failure
         return self._failed or why
 
@@ -79,7 +79,7 @@ class FeedbackHandle:
         self._process.tell(streams)
 
     def watch(self) -> list[FeedbackLost | FeedbackReady]:
-        """Look after the process; return what the session is to be told."""
+        """Check the process; return what to report to the session."""
         if self.given_up:
             return []
         if (why := self.failure) is not None:
@@ -96,7 +96,7 @@ class FeedbackHandle:
 
     def _replace(self, why: str) -> list[FeedbackLost | FeedbackReady]:
         self._process.kill()
-        why = self._failed or why  # what it said with its last breath
+        why = self._failed or why  # its last reports
         self._begin_anew()
         if not self._process.restart(self._order.as_json()):
             self.given_up = True

@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from labcrane.streams.feedback_log import FeedbackLog
 
 GAP_S = (0.22, 0.41)
-"""Shortest and longest time between two changes: drawn, so that no refresh rate is in step."""
+"""Shortest and longest time between two changes: random, to avoid step with a refresh rate."""
 
 PULL_S = 0.004
 SETTLE_S = 0.3
 LATE_S = 0.5
-"""How long after the last change the sensor is still listened to."""
+"""How long the sensor is recorded after the last change."""
 
 WAIT_S = 10.0
-"""How long the sensor's stream is looked for."""
+"""How long the sensor's stream is searched for."""
 
 SIDE_M = 0.4
 """How far the tip is from the target for which a sound is made, in metres."""
@@ -60,11 +60,11 @@ class Sensor:
 
     @property
     def sends(self) -> bool:
-        """Whether anything has come."""
+        """Whether any sample has come."""
         return bool(self._times)
 
     def pull(self, wait_s: float) -> None:
-        """Take what has come, waiting for the first of it."""
+        """Take the samples that have come; wait for the first one."""
         deadline = time.monotonic() + wait_s
         while not (found := self._stream.pull())[1] and time.monotonic() < deadline:
             time.sleep(PULL_S)
@@ -81,7 +81,7 @@ class Sensor:
 
 
 class DelayStage:
-    """Presents one frame over and over, and changes it when it is told to."""
+    """Presents one frame repeatedly, and changes it on request."""
 
     def __init__(self, order: FeedbackConfig, frame: Frame, kind: Kind, event: str) -> None:
         self._kind, self._event, self._frame = kind, event, frame
@@ -106,7 +106,7 @@ class DelayStage:
         self._presenter.close()
 
     def change(self) -> None:
-        """Let the patch turn over, or the sound begin or end, with the next frame."""
+        """Change the patch, or begin or end the sound, with the next frame."""
         self._count += 1
         if self._kind == "display":
             now = SessionState(trial=1, counts={self._event: self._count})
@@ -115,7 +115,7 @@ class DelayStage:
         self._presenter.update(now)
 
     def present(self) -> float | None:
-        """Present the frame; return when that was, None for silence."""
+        """Present the frame; return its time, None for silence."""
         self._number += 1
         now = time.perf_counter()
         frame = replace(self._frame, tick=Tick(self._number, now, now))
@@ -139,11 +139,11 @@ def measure(
     Parameters
     ----------
     stream, channel
-        The sensor, and which of its channels, counted from 1.
+        The sensor's stream, and the number of its channel, from 1.
     count
-        How many changes are presented.
+        Number of presented changes.
     say
-        Tells people what is going on.
+        Reports progress.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def measure(
 
 
 def _kind(study: Study, name: str) -> tuple[Kind, str]:
-    """Return what kind of thing ``name`` is, and the event at which its patch turns over."""
+    """Return the kind of component ``name``, and the event at which its patch changes."""
     if name in study.sounds:
         return "audio", ""
     if name not in study.views:

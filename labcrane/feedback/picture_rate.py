@@ -16,19 +16,19 @@ from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import discover
 
 WARM_UP_S, SHOWN_S = 0.5, 2.0
-"""How long a view is drawn before its pictures are counted, and then."""
+"""Duration of drawing before pictures are counted, and of counting."""
 
 WAIT_S = 120.0
 """How long an examination may take: a movement is simulated first."""
 
 SPARE = 2.0
-"""In a session other programs need the processor too: so many times the least rate is enough."""
+"""Sufficient rate in multiples of the minimum: in a session other programs need the processor."""
 
-ADVICE = "choose a lower quality or size, close other programs, or look at the graphics driver"
+ADVICE = "choose a lower quality or size, close other programs, or check the graphics driver"
 
 
 def rate_examinations(study: Study) -> dict[str, Call]:
-    """Return how each view of the operator is examined, by its name."""
+    """Return the examination of each view of the operator, by its name."""
     folder = study.path.parent
     described = {f"views.{name}": each.described(folder) for name, each in study.views.items()}
     return {
@@ -38,7 +38,7 @@ def rate_examinations(study: Study) -> dict[str, Call]:
 
 
 def examine_rate(protocol: Path, name: str) -> list[Finding]:
-    """Return how many pictures a second a view shows.
+    """Return the picture rate of a view, per second.
 
     It is opened alone, as in a session, and shows a simulated movement of the study with all of its
     cues switched on.
@@ -60,7 +60,7 @@ def examine_rate(protocol: Path, name: str) -> list[Finding]:
 
 
 def _rate_hz(presenter: Presenter, frames: list[Frame]) -> float:
-    """Return how many pictures a second are shown of a movement."""
+    """Return the picture rate during a movement, per second."""
     begun = time.perf_counter()
     since, count = begun, 0
     for frame in frames:
@@ -76,10 +76,10 @@ def _rate_hz(presenter: Presenter, frames: list[Frame]) -> float:
 
 
 def judged(rate_hz: float, limits: PresentedLimits) -> Finding:
-    """Return what is to be said of a view that shows so many pictures a second."""
+    """Return the finding on a view that shows ``rate_hz`` pictures a second."""
     text = f"shows {rate_hz:.0f} pictures a second of this study; {limits.min_hz:g} are needed"
     if rate_hz < limits.min_hz:
-        return Finding(Verdict.FAIL, f"{text}, and no movement would count", ADVICE)
+        return Finding(Verdict.FAIL, f"{text}, so that no movement would be included", ADVICE)
     if rate_hz < SPARE * limits.min_hz:
         return Finding(Verdict.WARN, f"{text}, also while other programs run", ADVICE)
     return Finding(Verdict.PASS, text)

@@ -26,14 +26,14 @@ def played(
     now: Callable[[], float],
     rest: Callable[[float], None],
 ) -> Iterator[tuple[Frame, list[Event]]]:
-    """Yield the frame that is due whenever another one is, and what happened since the last.
+    """Yield each frame when it is due, and the events since the last one.
 
     Parameters
     ----------
     start_s
-        The second to begin at; what happened before comes with the first frame.
+        The second to begin at; earlier events come with the first frame.
     now, rest
-        A clock in seconds, and what waits for so many of them.
+        A clock in seconds, and a function that waits for a number of seconds.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def play(
 ) -> None:
     """Show and sound a recorded session in the views and sounds of its study.
 
-    Nothing is run again: what is shown are the recorded numbers, with the cues, the settings and
+    Nothing is simulated again: it shows the recorded numbers, with the cues, the settings and
     the scene of each moment.
 
     Raises
@@ -98,7 +98,7 @@ def play(
 
 def _run_of(study: Study, recorded: RecordedFrames) -> Run:
     run = Rig.build(study, simulated=True).describe(study, participant_seed=0)
-    return replace(run, axes=recorded.axes)  # what was recorded may have had other controls
+    return replace(run, axes=recorded.axes)  # the recording may have used other controls
 
 
 def _send_all(
@@ -127,7 +127,7 @@ def _send_all(
         send(first, events)
         hold(lambda: send(first, []), handles)
         shown = played(recorded, start_s, speed, time.perf_counter, time.sleep)
-        send(next(shown)[0], [])  # what happened until then was told
+        send(next(shown)[0], [])  # events until then were sent
         for frame, happened in shown:
             send(frame, happened)
         time.sleep(END_S)

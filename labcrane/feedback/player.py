@@ -20,10 +20,10 @@ PATIENCE_S = 10.0
 """How long to wait until all that are ready have presented the first frame."""
 
 HOLD_S = 1.5
-"""How long the first frame stands, at least."""
+"""Minimum duration of the first frame."""
 
 END_S = 1.0
-"""How long the last frame stands."""
+"""Duration of the last frame."""
 
 
 def play(study: Study, frames: Sequence[Frame], scene: str, say: Callable[[str], None]) -> None:
@@ -32,9 +32,9 @@ def play(study: Study, frames: Sequence[Frame], scene: str, say: Callable[[str],
     Parameters
     ----------
     scene
-        What stands around, as of :func:`labcrane.machines.read_placed`.
+        The scene, see :func:`labcrane.machines.read_placed`.
     say
-        Tells people what is going on.
+        Reports progress.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def wait_for_all(
     Raises
     ------
     DeviceError
-        All are left out; its words end with what to do ``instead``.
+        All are left out; its message ends with ``instead``, a remedy.
     """
     while not all(handle.ready or handle.given_up for handle in handles):
         for handle in handles:
@@ -103,7 +103,7 @@ def _present(
 
 
 def _send(pushes: Sequence[Callable[[Frame], None]], frame: Frame, *events: Event) -> None:
-    """Send a frame as one of now."""
+    """Send a frame with the present time."""
     now = time.perf_counter()
     sent = replace(frame, tick=Tick(frame.tick.number, now, now), events=events)
     for push in pushes:
@@ -113,7 +113,7 @@ def _send(pushes: Sequence[Callable[[Frame], None]], frame: Frame, *events: Even
 def hold(show: Callable[[], None], handles: Sequence[FeedbackHandle]) -> None:
     """Show the first frame until all present it, and for a while.
 
-    Whoever finds the streams now is told what is switched on within the second.
+    Programs that find the streams now learn within a second what is switched on.
     """
     began = time.perf_counter()
     while (now := time.perf_counter()) < began + HOLD_S or not (

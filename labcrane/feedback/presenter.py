@@ -35,7 +35,7 @@ class Presenter:
 
     @property
     def layout(self) -> Layout:
-        """What :meth:`present` returns: the component's signals, then those of every cue."""
+        """Signals of :meth:`present`: the component's, then those of every cue."""
         cues = (
             replace(signal, name=f"cue.{name}.{signal.name}")
             for name, cue in self.cues.items()
@@ -45,7 +45,7 @@ class Presenter:
 
     @property
     def facts(self) -> dict[str, Value]:
-        """What the record should know of the open component, and of its delay."""
+        """Facts of the open component and its delay, for the record."""
         facts = dict(self.feedback.metadata())
         return {**facts, "delay": delay_in_words(self._order.measured, facts)}
 
@@ -61,7 +61,7 @@ class Presenter:
             component.close()
 
     def update(self, situation: SessionState) -> None:
-        """Take up a new situation; what has new settings takes them, or is built anew with them."""
+        """Take up a new situation; components with new settings apply them or are rebuilt."""
         before, self._situation = self._situation, situation
         for name in {*situation.settings, *before.settings}:
             if situation.settings.get(name) != before.settings.get(name):
@@ -104,7 +104,7 @@ class Presenter:
             self.feedback.open(self._order.run)
 
     def _presenting(self) -> Feedback:
-        """Return the component, which knows what its window is called and which come before it."""
+        """Return the component, with its window's title and the windows before it."""
         order = self._order
         feedback = self._built(Feedback, order.name, order.part)
         settings = self._registry.find(Feedback, order.part.use).settings

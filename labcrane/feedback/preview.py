@@ -29,7 +29,7 @@ def write_preview(
     session: int = 1,
     trial: int | None = None,
 ) -> list[Path]:
-    """Write what one movement looks and sounds like with everything switched on.
+    """Write pictures and sounds of one movement with everything switched on.
 
     Parameters
     ----------
@@ -63,12 +63,12 @@ def write_preview(
 def chosen(
     study: Study, recording: Path | None, session: int, trial: int | None
 ) -> tuple[list[Frame], str]:
-    """Return the frames of one movement, and what stood around; as for :func:`write_preview`.
+    """Return the frames of one movement, and the scene; as for :func:`write_preview`.
 
     Raises
     ------
     ProtocolError
-        The study shows and sounds nothing, or there is no such trial.
+        The study has neither views nor sounds, or there is no such trial.
     """
     if not (study.views or study.sounds):
         raise ProtocolError(f"{study.path} has neither views nor sounds; add views: or feedback:")
@@ -81,7 +81,7 @@ def chosen(
 
 
 def movement(record: SessionRecord, trial: int | None = None) -> list[Frame]:
-    """Return the frames of a recorded trial; of the first counted one when it is not said.
+    """Return the frames of a recorded trial; by default of the first counted one.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def movement(record: SessionRecord, trial: int | None = None) -> list[Frame]:
 
 
 def scene_of(record: SessionRecord, trial: int | None = None) -> str:
-    """Return what stood around the machine in a recorded trial; empty when nothing did."""
+    """Return the scene around the machine in a recorded trial; empty for none."""
     if trial is None:
         trial = int(record.trials["trial"].iloc[0])
     events = record.events

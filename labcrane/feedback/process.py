@@ -1,7 +1,7 @@
 """A feedback process: one view or sound, fed with the newest frame.
 
 It is started by a :class:`labcrane.processes.handle.ProcessHandle` with a
-:class:`labcrane.feedback.config.FeedbackConfig`, is told the session's streams when there are any,
+:class:`labcrane.feedback.config.FeedbackConfig`, receives the session's streams when there are any,
 and ends when its parent does. It reports ``ready`` with the component's metadata, ``presents`` from
 the first frame on, ``beat`` while it lives, ``failed`` with the reason.
 """
@@ -86,7 +86,7 @@ class FeedbackProcess:
             presenter.close()
 
     def _join(self, context: "ContextInlet", log: "FeedbackLog") -> None:
-        """Wait for what belongs to the first frame: what it is about, and who records it."""
+        """Wait for the first frame's session state and for the recorder."""
         recorded = self._order.recorded
         since, heard = time.monotonic(), False
         while not (self._stop.is_set() or (context.text and (log.taken or not recorded))):
@@ -129,7 +129,7 @@ class FeedbackProcess:
     def _found(self, *names: str) -> "dict[str, pylsl.StreamInfo]":
         """Wait for the session's streams of these names; none when stopped first.
 
-        The launcher tells them; where there is none, as in a preview, they are searched for.
+        The launcher sends them; without one, as in a preview, they are searched for.
         """
         from labcrane.streams.outlets import source_id  # noqa: PLC0415 - liblsl
         from labcrane.streams.search import Search, known_stream  # noqa: PLC0415
@@ -157,18 +157,18 @@ class FeedbackProcess:
 
 
 def unheard(name: str, *, heard: bool) -> str:
-    """Say what a view or sound has waited for in vain, and what the likely cause is.
+    """Report which input of a view or sound is missing, and the likely cause.
 
     ``heard`` is whether the session's context came.
     """
     if not heard:
         return (
-            f"{name!r} found the session's streams and heard nothing of them for {TAKEN_S:g} s; "
-            "a firewall of this computer stops TCP to itself: allow the ports that labcrane doctor "
-            "names"
+            f"{name!r} found the session's streams but received nothing from them for "
+            f"{TAKEN_S:g} s; this computer's firewall blocks TCP to itself: allow the ports that "
+            "labcrane doctor names"
         )
     return (
-        f"no recorder has taken what {name!r} presents for {TAKEN_S:g} s; "
+        f"no recorder has received the stream of {name!r} for {TAKEN_S:g} s; "
         "labcrane doctor counts LSL's free ports: if none are left, end other programs "
         "that search or set PortRange = 128 in lsl_api.cfg (docs/lab.md)"
     )

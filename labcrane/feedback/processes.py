@@ -36,7 +36,7 @@ class FeedbackProcesses:
         Raises
         ------
         DeviceError
-            One cannot be started, and the protocol does not say to go on without it.
+            One cannot be started, and the protocol does not allow the session without it.
         """
         while not all(handle.ready or handle.given_up for handle in self.handles):
             for handle in self.handles:
@@ -45,7 +45,7 @@ class FeedbackProcesses:
                 if self._required:
                     raise DeviceError(
                         f"feedback {handle.name!r} cannot be started: {why} (on_fault: "
-                        "{feedback_lost: continue} would go on without it)"
+                        "{feedback_lost: continue} would continue without it)"
                     )
                 self._news += (news := handle.watch())
                 for report in news:
@@ -56,7 +56,7 @@ class FeedbackProcesses:
         return True
 
     def watch(self, say: Callable[[str], None]) -> list[FeedbackLost | FeedbackReady]:
-        """Look after all processes; return what the session is to be told, also of its start."""
+        """Check all processes; return what to report to the session, also about its start."""
         news = [report for handle in self.handles for report in handle.watch()]
         for report in news:
             say(f"feedback {report}")
@@ -65,7 +65,7 @@ class FeedbackProcesses:
 
     @property
     def sends(self) -> tuple[str, ...]:
-        """The descriptions of all streams in which feedback says what it did."""
+        """The descriptions of all streams in which feedback reports its presentation."""
         return tuple(text for handle in self.handles for text in handle.sends)
 
     def offer(self, streams: Mapping[str, str]) -> None:
@@ -80,7 +80,7 @@ class FeedbackProcesses:
 
 
 def host_orders(study: Study, run: Run, source: str) -> list[FeedbackConfig]:
-    """Return what the feedback processes of a study are to be told; ``source`` is whose streams."""
+    """Return the configurations of a study's feedback processes for the streams of ``source``."""
     cues = {name: _part(choice) for name, choice in study.cues.items()}
     views = {name: _part(choice) for name, choice in study.views.items()}
     parts = list(views.values())
@@ -118,7 +118,7 @@ def _orders_of(visit: Visit) -> list[FeedbackConfig]:
 
 
 def log_requests(visit: Visit) -> list[StreamRequest]:
-    """Return what the recorder is asked for: the streams in which feedback says what it did."""
+    """Return the requests to the recorder: the streams in which feedback reports."""
     study = visit.study
     found = []
     for name, choice in {**study.views, **study.sounds}.items():
@@ -132,7 +132,7 @@ def log_requests(visit: Visit) -> list[StreamRequest]:
 
 
 def cameras_of(study: Study) -> dict[str, tuple[str, ...]]:
-    """Return the names of the cameras whose pictures the supervisor is sent, by feedback."""
+    """Return the names of the cameras whose pictures the experimenter receives, by feedback."""
     chosen = {**study.views, **study.sounds}
     built = {name: choice.build(study.machine) for name, choice in chosen.items()}
     named = {name: getattr(feedback, "cameras", ()) for name, feedback in built.items()}

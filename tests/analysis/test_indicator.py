@@ -288,7 +288,7 @@ def test_a_workbook_under_another_name_is_refused(
     record(tmp_path / "data", "R001", vectors())
     assert main(["score", str(tmp_path / "data"), "--out", str(tmp_path / name)]) == 1
     said = " ".join(capsys.readouterr().err.split())
-    assert "is no name of a workbook; give one that ends in .xlsx" in said
+    assert "is not a workbook; give a name that ends in .xlsx" in said
     assert [each.name for each in tmp_path.iterdir()] == ["data"]
 
 
@@ -304,8 +304,8 @@ def test_what_was_judged_after_a_test_is_in_the_trial_table_and_counts(tmp_path:
         ],
     )
     first, second = scored(tmp_path)
-    assert (first.indicator.completed, first.why) == (False, "set by the supervisor")
-    after = "overridden by the supervisor after its end"
+    assert (first.indicator.completed, first.why) == (False, "set by the experimenter")
+    after = "overridden by the experimenter after its end"
     assert (second.indicator.completed, second.why) == (True, after)
     table = open_recording(tmp_path / "R001" / "R001.h5").session(1).trials
     assert table.set_index("trial")["completion"].loc[2] == 0
@@ -544,7 +544,7 @@ def test_a_test_of_which_the_operator_saw_nothing_is_left_out_by_name(
     ]  # fmt: skip
     unseen = ", ".join(f"trial {number} of session 1" for number in (1, 2, 3))
     assert said == [
-        ("P002", f"saw or heard too little in {unseen}, which count for nothing here "
+        ("P002", f"saw or heard too little in {unseen}, which are not scored "
          "(presented: in the protocol)"),
     ]  # fmt: skip
     assert main(["score", str(tmp_path)]) == LEFT_OUT

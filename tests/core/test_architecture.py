@@ -194,6 +194,7 @@ def test_a_package_says_what_comes_in_and_what_goes_out(package: Path) -> None:
     assert (
         package.name == "labcrane"
         or "In come" in read_start(package)
+        or "Input: " in read_start(package)
         or "::" in read_start(package)
     )
 

@@ -97,10 +97,12 @@ def test_what_the_supervisor_decides_counts_until_the_next_test_begins() -> None
     followed.take(Event("order.override", 0.0, {**after, "refused": "none is running"}))
     assert "k 0" in followed.lines({}, SETTINGS)[-1]
     followed.take(Event("order.override", 0.0, {**after, "text": "", "refused": None}))
-    said = "indicator: 100.0, 83.3 %; k 1 (overridden by the supervisor after its end)"
+    said = "indicator: 100.0, 83.3 %; k 1 (overridden by the experimenter after its end)"
     assert followed.lines({}, SETTINGS)[-1] == said
     followed.take(Event("order.completion", 0.0, {**after, "text": "0", "refused": None}))
-    assert followed.lines({}, SETTINGS)[-1] == "indicator: 0.0, 0.0 %; k 0 (set by the supervisor)"
+    assert (
+        followed.lines({}, SETTINGS)[-1] == "indicator: 0.0, 0.0 %; k 0 (set by the experimenter)"
+    )
     followed.take(began(4, "carry"))
     (*_, last) = followed.lines(frame(4, 1.0, {}), SETTINGS)
     assert last.endswith("k 1 (if it is completed)")

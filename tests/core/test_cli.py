@@ -153,7 +153,7 @@ def test_lines_of_a_pipe_are_orders(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         cwd=tmp_path, said="note hello there\nnonsense\nend",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert "'nonsense' is not an order; there is start, pause" in done.stdout
+    assert "'nonsense' is not an action; there is start, pause" in done.stdout
     session = labcrane.open_recording(tmp_path / "data" / "P002-PILOT" / "P002-PILOT.h5").session(1)
     names = session.events["name"].tolist()
     assert "order.note" in names

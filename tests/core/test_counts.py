@@ -117,7 +117,7 @@ def test_the_viewer_says_both_numbers_of_a_trial_of_a_resumed_session(visit: Vis
     wanted = {f"{counts.name(number)} ({number} in the tables)" for number in counts.counted}
     assert wanted <= begun
     assert any(text.startswith("practice trial 1 (") for text in begun)
-    assert "the way to a trial" in begun
+    assert "an approach movement" in begun
     assert set(counts.counted) == set(record.trials["trial"][record.trials["practice"] == 0])
 
 

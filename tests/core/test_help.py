@@ -19,7 +19,7 @@ COMMANDS = [name.replace("_", "-") for names in MODULES.values() for name in nam
 def test_every_command_stands_in_one_section() -> None:
     listed = [name for chosen in SECTIONS.values() for name in chosen]
     assert sorted(listed) == sorted([*COMMANDS, "feedback", "plugins"])
-    assert dict(sections([*listed, "of-a-plugin"]))["Of plugins"] == ["of-a-plugin"]
+    assert dict(sections([*listed, "of-a-plugin"]))["Commands from plugins"] == ["of-a-plugin"]
 
 
 def test_the_list_of_commands_is_in_sections_and_fits_the_terminal(
@@ -27,7 +27,7 @@ def test_the_list_of_commands_is_in_sections_and_fits_the_terminal(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     text = said(capsys, "--help")
-    places = [text.index(f"{title}:") for title in [*SECTIONS, "Of plugins"]]
+    places = [text.index(f"{title}:") for title in [*SECTIONS, "Commands from plugins"]]
     assert places == sorted(places)
     assert max(map(len, text.splitlines())) <= 80
 
@@ -55,5 +55,12 @@ def test_types_are_words_and_columns_stay_where_they_were() -> None:
 def test_the_version_tells_what_a_bug_report_needs(capsys: pytest.CaptureFixture[str]) -> None:
     text = said(capsys, "--version")
     assert re.search(r"^labcrane \d+\.\d+\.\d+ in /", text)
-    for word in ("Python 3.", "computer: ", "numpy ", "pylsl ", "panda3d ", "plugins of others: "):
+    for word in (
+        "Python 3.",
+        "computer: ",
+        "numpy ",
+        "pylsl ",
+        "panda3d ",
+        "third-party plugins: ",
+    ):
         assert word in text

@@ -203,8 +203,8 @@ def test_who_is_not_recorded_or_hears_nothing_says_why_after_a_time(
         SimpleNamespace(name="notes", recorded=True, streams={}), lambda _: None
     )
     for text, why in (
-        ("a trial", r"no recorder has taken what 'notes' presents.*PortRange"),
-        ("", r"'notes' found the session's streams and heard nothing of them.*firewall"),
+        ("a trial", r"no recorder has received the stream of 'notes'.*PortRange"),
+        ("", r"'notes' found the session's streams but received nothing from them.*firewall"),
     ):
         context = SimpleNamespace(text=text, changed=time.sleep)
         with pytest.raises(StreamError, match=why):

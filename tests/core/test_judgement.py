@@ -196,7 +196,7 @@ def test_the_last_test_is_judged_after_its_end_and_record_and_indicator_hold_it(
     assert last["completion"] == 0
     first, second = scores(visit)
     assert first.why == "more than 4 mistakes of one kind"
-    assert (second.indicator.completed, second.why) == (False, "set by the supervisor")
+    assert (second.indicator.completed, second.why) == (False, "set by the experimenter")
     assert data_of(session, "session.end") == [{"reason": "complete", "owed": ""}]
 
 
@@ -216,7 +216,7 @@ def test_a_judgement_can_be_mended_and_an_end_overridden_until_the_supervisor_go
         }
     easy, hard = scores(visit)
     assert (easy.indicator.completed, easy.why) == (True, "the task was done")
-    assert (hard.indicator.completed, hard.why) == (True, "set by the supervisor")
+    assert (hard.indicator.completed, hard.why) == (True, "set by the experimenter")
 
 
 @pytest.mark.parametrize(("asked", "waits"), [("", [3, 4]), (ASKED, [4])])
@@ -279,7 +279,7 @@ def test_a_session_that_stopped_in_the_wait_is_resumed_in_it_and_repeats_nothing
     assert len(session.trials) == 4
     assert session.trials.iloc[-1]["completion"] == 0
     assert [each.get("refused") for each in data_of(session, "order.override")] == [None]
-    assert scores(visit)[-1].why == "set by the supervisor"
+    assert scores(visit)[-1].why == "set by the experimenter"
     assert data_of(session, "session.end")[-1]["reason"] == "complete"
     with pytest.raises(ProtocolError, match="ran to its end"):
         run(replace(visit, resumed=True), Supervisor())
@@ -381,7 +381,7 @@ def test_the_operator_sees_a_quiet_screen_while_the_supervisor_judges(tmp_path: 
 
 def test_page_and_terminal_say_what_it_waits_for_and_can_judge_also_after_a_resume() -> None:
     said = _event_line(Event("judgement.awaited", 1.0, {"trial": 3, "attempt": 1}))
-    assert said == "the test has ended: c completion, o override; space to go on"
+    assert said == "the test has ended: c completion, o override; space to continue"
     view = SessionView()
     view.take(Event("session.start", 0.0, {}))
     view.take(Event("step.start", 0.0, {"step": 2, "kind": "block"}))

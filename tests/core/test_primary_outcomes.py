@@ -80,4 +80,4 @@ def test_the_report_says_which_outcomes_the_recorded_protocol_calls_primary(
     else:
         assert primary is None
         usual = "movement_time, absolute_error, circle_to_circle"
-        assert f"The protocol names no primary outcomes: {usual} count as such." in page
+        assert f"The protocol names no primary outcomes: {usual} are used as such." in page

@@ -200,8 +200,8 @@ UNLIKE = [
         ([("sessions:", "views: {front: {use: view, hint_s: 1 ms}}\nsessions:")], "views.front.hint_s", "nobody reads"),
         ([("sessions:", "views: {front: {use: view, patch: {size: 5000}}}\nsessions:")], "views.front.patch.size", "is 5000 pixels, and 720"),
         ([("{use: kinematic_crane}", "{use: kinematic_crane, actuator: {lag_s: 50}}")], "dynamics.actuator", "follows 50 s late"),
-        ([("{use: kinematic_crane}", "{use: bullet_crane, payload_kg: 99 t}")], "dynamics.payload_kg", "is 99000 kg, and with it"),
-        ([("{use: kinematic_crane}", "{use: bullet_crane, grapple: {length_m: 30}}")], "dynamics.grapple.length_m", "is 30 m, and the crane itself reaches"),
+        ([("{use: kinematic_crane}", "{use: bullet_crane, payload_kg: 99 t}")], "dynamics.payload_kg", "is 99000 kg; with it"),
+        ([("{use: kinematic_crane}", "{use: bullet_crane, grapple: {length_m: 30}}")], "dynamics.grapple.length_m", "is 30 m, but the crane itself reaches only"),
         ([("sessions:", f"design: {{groups: {{ball: [ball]}}}}\n{BALL}"), (BLOCK, BLOCK.replace("pairs", "feedback: group, pairs"))],
          "design.groups", "'ball' is the only group"),
         ([("movements: 2", "movements: 2, onset_hold_s: 100")], "tasks.aiming.onset_hold_s", "no movement has an onset or a reaction time"),
@@ -603,7 +603,7 @@ def test_nothing_is_locked_or_amended_while_something_is_asked(
 
     said = refused("approve", path, *granted)
     assert ":4:10: question: rate_hz is 10 Hz" in said
-    assert said.endswith("nothing was locked: answer what is asked above first")
+    assert said.endswith("nothing was locked; answer the warnings above first")
     assert not lock.exists()
     asking = study.path.read_text()
     keys = re.findall(r"if it is, write expected: \[(.+?)\]", said)

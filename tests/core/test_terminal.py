@@ -159,5 +159,5 @@ def test_a_line_is_short_and_says_nothing_of_what_is_not_known() -> None:
     place = "dynamics 'slow' of plugin 'p', in step (/home/someone/a/b/slow.py:12), took 9 ms"
     slow = Event("plugin.slow", 0.0, {"why": place})
     assert _event_line(slow) == (
-        "PLUGIN SLOW: dynamics 'slow' of plugin 'p', in step (slow.py:12), took 9 ms"
+        "Plugin slow: dynamics 'slow' of plugin 'p', in step (slow.py:12), took 9 ms"
     )

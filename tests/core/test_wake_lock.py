@@ -78,8 +78,8 @@ def test_doctor_says_who_keeps_the_screen_awake_or_what_to_do(desktop: Path) -> 
     (none,) = examine()
     assert (none.verdict, none.text) == (
         Verdict.WARN,
-        "the screen may go blank or lock itself in a session: nothing keeps it awake (no program "
-        "that could is installed)",
+        "the screen may go blank or lock during a session: nothing keeps it awake (no program "
+        "that can do so is installed)",
     )
     assert "switch off blanking" in none.advice
     install(desktop, "systemd-inhibit", GRANTS)

@@ -34,7 +34,7 @@ def test_a_slewed_clock_is_told_apart_from_a_set_one() -> None:
     assert warned.text.startswith("the clock runs -480.0 ppm against the hardware")
     assert "wait until it has settled" in warned.advice
     (warned,) = [one for one in was_set if "wall clock" in one.text]
-    assert warned.text == "the wall clock was set by -1.500 s while it was watched"
+    assert warned.text == "the wall clock was set by -1.500 s during the check"
 
 
 def test_this_computers_clock_is_fine_enough_and_runs_like_its_hardware() -> None:

@@ -59,7 +59,9 @@ def test_the_doctor_draws_the_studys_own_picture_and_says_how_many_come_a_second
     assert 4.0 <= found[8] <= 8.0
     assert found[8] + 2.0 <= found[20] <= 20.0  # a busy computer shows fewer
     assert said[8].startswith("FAIL view cab: shows ")
-    assert said[8].endswith("a second of this study; 15 are needed, and no movement would count")
+    assert said[8].endswith(
+        "a second of this study; 15 are needed, so that no movement would be included"
+    )
     assert said[20].startswith(f"{judged(found[20], PresentedLimits()).verdict.value} view cab:")
 
 

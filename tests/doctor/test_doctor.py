@@ -78,18 +78,18 @@ def lamp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> type[labcrane.Setti
     ("does", "verdict", "text"),
     [
         ("nothing", Verdict.PASS, "the lamp is lit"),
-        ("raises", Verdict.FAIL, "looking at feedback 'lamp' raised OSError: no lamp"),
+        ("raises", Verdict.FAIL, "examining feedback 'lamp' raised OSError: no lamp"),
         (
             "exits",
             Verdict.FAIL,
-            "looking at feedback 'lamp' ended its process with exit code 3; "
-            "the last it said was 'lamp: burnt out'",
+            "examining feedback 'lamp' ended its process with exit code 3; "
+            "its last output was 'lamp: burnt out'",
         ),
         (
             "hangs",
             Verdict.FAIL,
-            "looking at feedback 'lamp' did not answer within 8 s; it "
-            f"stood still in examine() (labcrane_doctors_lamp.py:{LINE})",
+            "examining feedback 'lamp' did not answer within 8 s; it "
+            f"was stuck in examine() (labcrane_doctors_lamp.py:{LINE})",
         ),
     ],
 )
@@ -129,7 +129,7 @@ def test_a_data_folder_that_hangs_is_named_and_the_rest_is_looked_at(
     (hung,) = [check.finding for check in checks if check.area == "disk"]
     assert hung.verdict is Verdict.FAIL
     assert hung.text.startswith(
-        f"looking at folder {tmp_path} did not answer within 4 s; it stood still in disk_usage() "
+        f"examining folder {tmp_path} did not answer within 4 s; it was stuck in disk_usage() "
         "(sitecustomize.py:4), called by _space() (disk.py:"
     )
     assert "mount it again, or give --data" in hung.advice
@@ -179,7 +179,7 @@ def test_a_process_that_cannot_be_ended_keeps_the_doctor_no_longer_than_its_pati
     monkeypatch.setattr(apart, "END_S", 0.1)
     try:
         found = keep_apart(diagnosis([]), tmp_path)
-        assert found.text.startswith(f"kept in {tmp_path}")
+        assert found.text.startswith(f"saved in {tmp_path}")
     finally:
         released.set()
 
@@ -188,7 +188,7 @@ def test_a_diagnosis_that_cannot_be_kept_is_told(tmp_path: Path) -> None:
     (tmp_path / "data").write_text("no folder")
     found = keep_apart(diagnosis([]), tmp_path / "data")
     assert found.verdict is Verdict.FAIL
-    assert found.text.startswith(f"looking at folder {tmp_path / 'data'} raised RecordingError: ")
+    assert found.text.startswith(f"examining folder {tmp_path / 'data'} raised RecordingError: ")
 
 
 def test_a_study_needs_looks_at_what_it_uses_and_at_nothing_else() -> None:
@@ -242,5 +242,5 @@ def test_only_a_diagnosis_of_this_computer_and_of_the_last_day_counts(tmp_path: 
     path.write_text(path.read_text().replace(f'"{platform.node()}"', '"another"'))
     assert latest(tmp_path, now) is None
     path.write_text("{}")
-    with pytest.raises(RecordingError, match=r"holds no diagnosis .* run labcrane doctor again"):
+    with pytest.raises(RecordingError, match=r"contains no diagnosis .* run labcrane doctor again"):
         latest(tmp_path)

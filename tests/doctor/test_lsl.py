@@ -44,8 +44,8 @@ def test_streams_that_are_there_missing_or_wrong_are_told_apart(
             StreamRequest("wrong", name=NAME, channels=32),
         ]
     )
-    assert about(found, "of our own").verdict is Verdict.PASS
-    assert "this computer only" in about(found, "of our own").text
+    assert about(found, "a test stream").verdict is Verdict.PASS
+    assert "this computer only" in about(found, "a test stream").text
     assert about(found, "stream eeg").verdict is Verdict.PASS
     missing = about(found, "gaze")
     assert missing.verdict is Verdict.FAIL
@@ -75,21 +75,24 @@ def test_a_stream_asked_for_by_its_type_alone_is_asked_about_and_rivals_are_refu
         ]
     )
     del mine, his, other
-    rivals, either = about(found, "could be any"), about(found, "stream eeg (type 'DoctorEEG') is")
+    rivals, either = (
+        about(found, "matches 2 streams"),
+        about(found, "stream eeg (type 'DoctorEEG') is"),
+    )
     assert (rivals.verdict, either.verdict) == (Verdict.FAIL, Verdict.WARN)
     assert "stream either (name " in rivals.text
-    assert "could be any of 2, and no run begins: " in rivals.text
-    assert "is asked for by its type alone, and a run asks which is meant: " in either.text
+    assert "matches 2 streams, so no run begins: " in rivals.text
+    assert "is requested by type only, and a run asks for confirmation: " in either.text
     for who in ("mine", "his"):
         for one in (rivals, either):
             assert f"{f'{NAME} twin'!r} (source_id {who!r}) of " in one.text
-    assert rivals.advice.startswith("write the source_id of the one that is meant")
+    assert rivals.advice.startswith("set the source_id of the right stream")
     asked, meant = (
         about(found, f"stream {label} (type 'DoctorGaze') is") for label in ("gaze", "any")
     )
     assert (asked.verdict, meant.verdict) == (Verdict.WARN, Verdict.PASS)
-    assert f"and a run asks which is meant: {f'{NAME} gaze'!r}" in asked.text
-    assert asked.advice == "write the source_id of the one that is meant in the protocol"
+    assert f"and a run asks for confirmation: {f'{NAME} gaze'!r}" in asked.text
+    assert asked.advice == "set the source_id of the right stream in the protocol"
     assert not [one for one in found if "stream all" in one.text and "any of" in one.text]
     assert not [one for one in found if "stream known" in one.text and "asks" in one.text]
 
@@ -131,7 +134,7 @@ def test_our_own_stream_is_not_found_when_nothing_gets_through() -> None:
         text=True,
         check=True,
     )
-    assert done.stdout.startswith("FAIL a stream of our own is not found (UDP 16571) | the fire")
+    assert done.stdout.startswith("FAIL a test stream is not found (UDP 16571) | the fire")
 
 
 @contextmanager
@@ -153,9 +156,9 @@ def test_silence_is_a_firewall_and_a_refusal_is_a_missing_program() -> None:
     with mute_ports(lsl.PORTS) as first:
         (silent,) = lsl.ask_peer(HOST, first, wait_s=0.3)
     (refused,) = lsl.ask_peer(HOST, first, wait_s=0.3)
-    assert silent.text == f"{HOST} does not say a word on UDP {first} to {first + 33}"
-    assert "a firewall stops LSL" in silent.advice
-    assert refused.text.endswith("lets LSL through, and no program sends a stream there")
+    assert silent.text == f"{HOST} does not answer on UDP {first} to {first + 33}"
+    assert "a firewall blocks LSL" in silent.advice
+    assert refused.text.endswith("lets LSL through, but no program sends a stream there")
 
 
 @pytest.mark.parametrize("said", [b"LSL:shortinfo\r\nuid\r\n36014 1\r\n", b"", b"\xff\r\n<info>"])

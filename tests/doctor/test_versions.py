@@ -43,7 +43,7 @@ def test_the_configuration_of_lsl_that_is_in_force_is_named(
 ) -> None:
     config = tmp_path / "lsl_api.cfg"
     monkeypatch.setenv("LSLAPICFG", str(config))
-    assert versions.configuration() == f"LSLAPICFG is {config}, which is not there"
+    assert versions.configuration() == f"LSLAPICFG is {config}, which does not exist"
     config.touch()
     assert versions.configuration() == f"LSLAPICFG is {config}"
     monkeypatch.delenv("LSLAPICFG")
@@ -64,9 +64,11 @@ def test_a_clone_names_its_commit_and_whether_it_was_changed(
     (tmp_path / "loop.py").write_text("second")
     assert versions.commit(tmp_path) == f", commit {head[:12]}-dirty"
     monkeypatch.setenv("PATH", "")
-    assert versions.commit(tmp_path) == ", a clone of which git is not there to tell the commit"
+    assert (
+        versions.commit(tmp_path) == ", a clone; its commit is unknown, since git is not installed"
+    )
 
 
 def test_a_clone_that_git_cannot_read_says_why(tmp_path: Path) -> None:
     (tmp_path / ".git").write_text("gitdir: /nowhere")
-    assert "git does not tell the commit (fatal: not a git repository" in versions.commit(tmp_path)
+    assert "its commit is unknown (fatal: not a git repository" in versions.commit(tmp_path)

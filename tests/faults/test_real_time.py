@@ -93,6 +93,6 @@ def test_who_may_have_no_real_time_priority_is_told_how_before_anything_is_recor
 def test_a_session_without_a_clock_has_no_real_time(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["run", "study.yaml", "--participant", "P001", "--simulate", "--fast", "--real-time"]
     assert main(words) == 2
-    assert "--fast has no real time to keep; leave out one of --fast, --real-time" in (
+    assert "--fast and --real-time cannot be combined; drop one" in (
         " ".join(capsys.readouterr().err.split())
     )

@@ -134,7 +134,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
         said.order("start")
         said.until("block 1")
         sender.kill()
-        said.until("STREAM LOST: eeg")
+        said.until("Stream lost: eeg")
         sender.start(first=100_000)
         said.until("eeg is back")
         for kill in range(RECORDER_KILLS):
@@ -144,7 +144,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
         wait_for(lambda: all_receive(process) and len(spares(process)) == SPARES)
         for recorder in recorders(process):
             recorder.kill()
-        said.until("STREAM LOST", times=2)
+        said.until("Stream lost", times=2)
         said.until(" is back", times=2)
         wait_for(lambda: all_receive(process))
         said.order("note all is well again")

@@ -86,7 +86,7 @@ def test_a_bundle_is_installed_without_network_and_gives_the_same_bits(tmp_path:
     person = [python, "-m", "labcrane", "run", moved, "--participant", "P001", "--no-page"]
     done = run(*person)
     assert done.returncode == 2
-    assert "and says environment: refuse:" in done.stderr
+    assert "and specifies environment: refuse:" in done.stderr
     assert re.search(r"^  pluggy was \S+, is 1\.5\.0$", done.stderr, re.MULTILINE)
 
 
@@ -169,16 +169,20 @@ SPOILT = {
     "a plugin beside": (
         "study/plugins/evil.py",
         "import os",
-        "study/plugins/evil.py is no part",
+        "study/plugins/evil.py is not part",
     ),
-    "a wheel beside": ("wheels/a.whl", "a wheel", "wheels/a.whl is no part of this bundle; remove"),
+    "a wheel beside": (
+        "wheels/a.whl",
+        "a wheel",
+        "wheels/a.whl is not part of this bundle; remove",
+    ),
     "half an about": ("bundle.json", '{"python": "3.1', "bundle.json is missing or damaged (JSOND"),
     "an about of a list": ("bundle.json", "[]", "bundle.json is missing or damaged (TypeError"),
     "a deep about": ("bundle.json", "[" * 100_000, "bundle.json is missing or damaged (Recursion"),
     "no texts": (
         "bundle.json",
         '{"python": 3, "system": 1, "protocol": []}',
-        "bundle.json is damaged: it says no texts",
+        "bundle.json is damaged: it has no texts",
     ),
     "another place": (
         "bundle.json",
@@ -210,4 +214,4 @@ def test_a_link_in_a_bundle_is_refused(tmp_path: Path) -> None:
     folder = packed(tmp_path / "stick")
     (folder / "study" / "more.py").symlink_to("plugins/own.py")
     [why] = bundle_install._wrong(folder, tmp_path / "there")
-    assert why == "study/more.py is a link, which no bundle holds; copy the bundle again"
+    assert why == "study/more.py is a link, which bundles do not contain; copy the bundle again"

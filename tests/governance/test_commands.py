@@ -172,7 +172,7 @@ def test_a_date_that_is_none_is_told(study: Path, capsys: pytest.CaptureFixture[
         capsys, "approve", "study.yaml", "--board", "B", "--reference", "R",
         "--valid-until", "next year", "--consent", "consent.txt", status=2,
     )  # fmt: skip
-    assert "'next year' is no date; write it as 2027-12-31" in said
+    assert "'next year' is not a date; write it as 2027-12-31" in said
 
 
 def test_who_is_not_in_the_register_is_told(

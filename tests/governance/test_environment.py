@@ -91,11 +91,11 @@ def test_another_version_of_a_package_is_refused_by_its_name(
     with pytest.raises(ProtocolError) as refused:
         check_eligibility(lab.visit("P001"))
     first, difference, todo = str(refused.value).splitlines()
-    assert first.endswith("with other packages, and says environment: refuse:")
+    assert first.endswith("with other packages, and specifies environment: refuse:")
     assert difference == "  winch was 1.0, is 2.0"
     assert todo == (
-        "install what there was, as from the study's bundle; record the change with labcrane "
-        "amend; or use --pilot"
+        "install the approved packages, for example from the study's bundle; record the "
+        "change with labcrane amend; or use --pilot"
     )
 
 
@@ -103,7 +103,9 @@ def test_the_same_version_with_other_files_is_refused(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     see(monkeypatch, package(lab.folder / "again", "1.0", content="2"))
-    with pytest.raises(ProtocolError, match=r"winch 1\.0 has other files than the winch of then"):
+    with pytest.raises(
+        ProtocolError, match=r"winch 1\.0 has other files than when the study was approved"
+    ):
         check_eligibility(lab.visit("P001"))
 
 

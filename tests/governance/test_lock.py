@@ -117,7 +117,7 @@ def test_a_folder_counts_with_all_that_is_in_it(lab: Lab) -> None:
         (scene / "new.txt").write_text("more", encoding="utf-8")
 
     told = compared(lab, {"scene": "scene/"}, change)
-    assert told == ["file scene/mesh.bin has another content", "file scene/new.txt is new"]
+    assert told == ["file scene/mesh.bin has different content", "file scene/new.txt is new"]
 
 
 def test_nothing_outside_the_studys_folder_is_read(tmp_path: Path) -> None:

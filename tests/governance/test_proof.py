@@ -125,7 +125,7 @@ def test_erasing_ends_with_what_nobody_could_search(
     words = ["erase", "P007", "--data", str(lab.places.root), "--reason", REASON, "--yes"]
     assert main(words) == 0
     said = " ".join(capsys.readouterr().out.split())
-    told = "cannot be searched for P007; open it yourself, and see:"
+    told = "cannot be searched for P007; check it yourself:"
     root = " ".join(str(lab.places.root).split())
     assert f"{told} {root}/note.txt in notes.zip: it needs a password" in said
     assert f"{told} {root}/old/notes.xlsx: it needs a password" in said

@@ -80,13 +80,13 @@ def forget(root: Path) -> None:
 @pytest.mark.parametrize(
     ("damage", "said"),
     [
-        (edit, "pluggy/_hooks.py of pluggy {} was changed after it was installed; install it anew"),
-        (remove, "pluggy/_hooks.py of pluggy {} is gone; install it anew"),
+        (edit, "pluggy/_hooks.py of pluggy {} was changed after it was installed; reinstall it"),
+        (remove, "pluggy/_hooks.py of pluggy {} is gone; reinstall it"),
         (
             put_outside,
             "../../../share/man/pluggy.1 of pluggy {} is outside the folder of packages; ",
         ),
-        (forget, "how pluggy {} was installed is not written down; install it"),
+        (forget, "no record states how pluggy {} was installed; install it"),
     ],
 )
 def test_what_is_not_as_it_was_installed_is_refused_by_its_name(

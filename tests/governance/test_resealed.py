@@ -61,7 +61,10 @@ def test_a_swapped_consent_text_is_noticed_wherever_somebody_is_to_take_part(
     approved = read_lock(lab.protocol).seal
     lab.consent("P002")
     swapped(lab)
-    match = rf"no amendment in it has replaced that one.*\n  P001, session 1 of .*: {approved[:12]}"
+    match = (
+        "contains no amendment that replaces that lock.*\n"
+        rf"  P001, session 1 of .*: {approved[:12]}"
+    )
     for name in ("P001", "P002", "P003"):
         with pytest.raises(ProtocolError, match=match):
             check_eligibility(lab.visit(name))
@@ -89,11 +92,11 @@ def test_amendments_are_followed_back_to_the_lock_under_which_people_took_part(l
 SHAPES: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "no consent text": (
         lambda lock: lock["materials"].pop("consent"),
-        "its approval is of the consent text 'consent_v2.txt', and its materials hold another",
+        "its approval is of the consent text 'consent_v2.txt', but its materials contain another",
     ),
     "another file": (
         lambda lock: lock["approval"].update(consent="other.txt"),
-        "its approval is of the consent text 'other.txt', and its materials hold another",
+        "its approval is of the consent text 'other.txt', but its materials contain another",
     ),
     "a file elsewhere": (
         lambda lock: (
@@ -104,10 +107,13 @@ SHAPES: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     ),
     "two texts": (
         lambda lock: lock["materials"]["consent"].update(other={}),
-        "its materials hold another",
+        "its materials contain another",
     ),
-    "no day": (lambda lock: lock["approval"].update(valid_until="soon"), "'soon', which is no day"),
-    "no board": (lambda lock: lock["approval"].pop("board"), "its approval does not say board,"),
+    "no day": (
+        lambda lock: lock["approval"].update(valid_until="soon"),
+        "'soon', which is not a date",
+    ),
+    "no board": (lambda lock: lock["approval"].pop("board"), "its approval lacks board,"),
     "no approval": (lambda lock: lock.update(approval=[]), "it lacks the approval"),
     "no history": (lambda lock: lock.pop("history"), "the materials or the history"),
     "a history of words": (lambda lock: lock.update(history=["x"]), "or the history"),

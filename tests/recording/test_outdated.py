@@ -172,7 +172,7 @@ def test_a_session_begun_with_faults_is_gone_on_with_as_it_was_begun(tmp_path: P
     with pytest.raises(ProtocolError) as refused:
         load(path, discover(study=path))
     said = "".join(labcrane_command("resume", path, *arguments).split())  # it is in lines
-    told = f"gone on with as it was begun; a new session would be refused:{refused.value}"
+    told = f"continued as it was begun; a new session would be refused:{refused.value}"
     assert "".join(told.split()) in said
     path.write_text(path.read_text() + "# another text\n")
     with pytest.raises(AssertionError, match=r"study\.yaml"):

@@ -82,7 +82,7 @@ def test_the_report_lists_marks_and_the_page_of_somebody_without_any_says_nothin
         assert main(["report", str(data), "--out", str(out)]) == 0
         page = (out / "participants" / "P001.html").read_text("utf-8")
         assert ("looked at the phone" in page) is there
-        assert ("What people marked" in page) is there
+        assert ("Annotations made in the viewer" in page) is there
         assert "a slip" not in page
 
 

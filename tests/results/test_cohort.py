@@ -53,7 +53,7 @@ def test_a_folder_without_anybody_to_use_says_what_is_in_it(tmp_path: Path) -> N
     with pytest.raises(RecordingError, match=r"there is no data folder .*; give the study's"):
         find_cohort(tmp_path / "nowhere")
     erased = {"P001": (Status.ERASED, "on 2026-05-01: withdrew")}
-    with pytest.raises(RecordingError, match=r"can be used as asked: 1 erased$"):
+    with pytest.raises(RecordingError, match=r"no usable participant in .*: 1 erased$"):
         find_cohort(tmp_path, struck=erased)
 
 
@@ -61,9 +61,9 @@ def test_the_folder_of_one_recording_is_told_from_a_study(data: Path) -> None:
     with pytest.raises(RecordingError) as told:
         find_cohort(data / "P001")
     assert str(told.value) == (
-        f"{data / 'P001'} is not a study's data folder but holds one recording, P001.h5; give the "
-        "folder above it, or read what was recorded without a study with labcrane.open_recording, "
-        "or its ses-*_streams.xdf with any reader of XDF"
+        f"{data / 'P001'} is not a study's data folder but contains one recording, P001.h5; give "
+        "the folder above it, or read what was recorded without a study with "
+        "labcrane.open_recording, or its ses-*_streams.xdf with any reader of XDF"
     )
 
 

@@ -193,9 +193,9 @@ def test_orders_that_were_not_had_equally_often_are_told_with_their_numbers(peop
         assert found == ""
     else:
         assert found == (
-            "Conditions did not come equally often in each place: in 1 b1, "
-            f"a for {first[0]}, b for {first[1]} and c for {first[2]} participants; what changes "
-            "from place to place is in part in the differences between them."
+            "Conditions were not equally frequent at each place: in 1 b1, "
+            f"a for {first[0]}, b for {first[1]} and c for {first[2]} participants; differences "
+            "between conditions include part of the change from place to place."
         )
 
 

@@ -61,14 +61,22 @@ def test_of_one_order_for_everybody_no_number_is_called_adjusted_or_an_effect_al
     assert set(results.trends["confounded"]) == {"pairs of targets"}
     said = in_words(results)
     assert said.count(TAKEN) == 1
-    assert f"Not tested over sequence {TAKEN}: positions cannot be told from pairs of" in said
-    assert "over sequence (cannot be told from pairs of targets), F(" in said
-    assert "over distance (cannot be told from positions), F(" in said
-    assert "it " not in said.split("Over the positions of ")[1].split(" (cannot be told from")[0]
-    assert ": not tested, positions cannot be told from pairs of targets." in said
+    assert (
+        f"Not tested over sequence {TAKEN}: positions cannot be distinguished from pairs of" in said
+    )
+    assert "over sequence (cannot be distinguished from pairs of targets), F(" in said
+    assert "over distance (cannot be distinguished from positions), F(" in said
+    assert (
+        "it "
+        not in said.split("Over the positions of ")[1].split(" (cannot be distinguished from")[0]
+    )
+    assert ": not tested, positions cannot be distinguished from pairs of targets." in said
     assert "Pairs of targets come in several orders" not in page
-    assert "What sequence does cannot be told from pairs of targets" in page
-    assert "What distance and far_side and distance:far_side do cannot be told from posit" in page
+    assert "The effect of sequence cannot be distinguished from pairs of targets" in page
+    assert (
+        "The effects of distance and far_side and distance:far_side cannot be distinguished from "
+        in page
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -77,8 +85,8 @@ def test_the_answer_has_no_number_for_what_cannot_be_told_apart(found: Found, se
     results, _ = found(table)
     (said,) = _effects(table, results)
     assert "F(" not in said
-    assert "what sequence does cannot be told from pairs of targets" in said
-    assert "what distance does cannot be told from positions" in said
+    assert "the effect of sequence cannot be distinguished from pairs of targets" in said
+    assert "the effect of distance cannot be distinguished from positions" in said
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -88,7 +96,7 @@ def test_of_orders_of_ones_own_everything_is_told_apart_and_called_as_it_was_tes
     results, page = found(drawn(seed, (9,), sessions=1))
     assert set(results.anova["confounded"]) == {""}
     said = in_words(results)
-    assert "cannot be told from" not in said + page
+    assert "cannot be distinguished from" not in said + page
     assert f"over sequence {TAKEN}, F(" in said
     assert f"Change with each position of session 1, {TAKEN}:" in said.replace(
         "acquisition", "session 1"
@@ -137,4 +145,4 @@ def test_a_factor_of_which_each_did_a_chance_part_is_said_not_to_be_tested(
 def test_the_file_for_papers_says_the_same(found: Found, tmp_path: Path) -> None:
     found(in_orders(6, 5, orders=1))
     said = (tmp_path / "results.md").read_text(encoding="utf-8")
-    assert "(cannot be told from pairs of targets)" in said
+    assert "(cannot be distinguished from pairs of targets)" in said

@@ -56,13 +56,13 @@ def test_arrow_filters_everybody_at_once(dataset: Dataset, cohort: Cohort) -> No
 def test_what_is_not_there_is_said_with_what_is(dataset: Dataset) -> None:
     with pytest.raises(RecordingError, match=r"no participant 'P009'; it has P001, P002"):
         dataset["P009"]
-    with pytest.raises(RecordingError, match="nobody selected has session 7"):
+    with pytest.raises(RecordingError, match="no selected participant has session 7"):
         dataset["P001", 7]
     with pytest.raises(RecordingError, match=r"no column 'boom'; it has participant, session"):
         dataset.select("boom")
     with pytest.raises(RecordingError, match=r"slice.* selects a range; give one name or number"):
         dataset["P001", 1, 1:3]
-    with pytest.raises(RecordingError, match=r"'1' is no number of a session or trial"):
+    with pytest.raises(RecordingError, match=r"'1' is not the number of a session or trial"):
         dataset["P001", "1"]
 
 

@@ -69,7 +69,7 @@ def test_means_and_n_beside_a_test_are_of_those_who_were_tested(
         assert len(means) == len(wanted)
         for (level, mean), value in zip(means.items(), wanted, strict=True):
             assert mean == pytest.approx(value, rel=6e-3), (name, level)
-    assert "Not in every test, for the reason that stands with each: " in _untested(results)[0]
+    assert "Not in every test, for the reasons given: " in _untested(results)[0]
 
 
 AFEX = """

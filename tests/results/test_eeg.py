@@ -74,7 +74,7 @@ def test_what_cannot_be_put_at_samples_is_refused_in_words(session: SessionRecor
     with pytest.raises(RecordingError, match=r"'Fz' states no unit; give the one of its source"):
         volts(none, amp)
     np.testing.assert_allclose(volts(none, amp, "mV"), [1e-3, 1e-3, 1e-3, 1.0])
-    with pytest.raises(RecordingError, match=r"'Fz' is in no voltage: '1 degC' "):
+    with pytest.raises(RecordingError, match=r"'Fz' is not a voltage: '1 degC' "):
         volts(none, amp, "degC")
 
 

@@ -107,7 +107,7 @@ def test_of_areas_within_each_other_the_smallest_is_looked_at() -> None:
 def test_gaze_without_a_measured_delay_or_of_another_shape_is_refused() -> None:
     time, gaze, shown = np.zeros(2), np.zeros((2, 2)), np.zeros(1)
     with pytest.raises(
-        ValueError, match=r"^the display's delay is not known, so nobody knows which"
+        ValueError, match=r"^the display's delay is unknown, so gaze cannot be matched"
     ):
         looks_on_screen(time, gaze, shown, {}, math.nan)
     with pytest.raises(ValueError, match=r"^gaze is \(3, 2\), and 2 times need \(2, 2\)$"):
@@ -148,6 +148,6 @@ def test_an_offset_of_0_8_degrees_is_recovered_within_0_05(
 
 def test_a_drift_of_nothing_but_blinks_is_refused() -> None:
     with pytest.raises(
-        ValueError, match=r"^no gaze sample was valid while the target was to be looked"
+        ValueError, match=r"^no gaze sample was valid during fixation of the target"
     ):
         drift(np.full((5, 2), math.nan), (0.0, 0.0), (0.0, 0.0), 3600.0, 0.7)

@@ -47,9 +47,9 @@ def test_pixels_of_which_nobody_says_of_what_are_measured_nowhere(unstated: Path
     assert not glanced(session)
     why = dict(unmeasured(session))
     assert why["eyes"] == (
-        "is in pixels, and neither the protocol nor its header says of what; if they are the "
-        "participant's window's, declare it with labcrane resync FILE --space 'eyes=screen', else "
-        "'eyes=scene'"
+        "is in pixels, but neither the protocol nor its header states of which picture; for the "
+        "participant's window, declare it with labcrane resync FILE --space 'eyes=screen'; for a "
+        "scene camera, 'eyes=scene'"
     )
     assert why["glasses"].startswith("is in pixels of a scene camera, which moves with the head")
 
@@ -99,7 +99,7 @@ def test_of_two_streams_that_could_be_measured_none_is_until_one_is_named(
     assert looks(session) is None
     assert [name for name, _ in unmeasured(session)] == ["eyes", "glasses"]
     assert unmeasured(session)[0][1].startswith(
-        "could be measured as well as others: 'eyes' and 'glasses'; say which"
+        "could be measured as well as others: 'eyes' and 'glasses'; choose one"
     )
     assert "dwell_during_target" in measure_session(session, MeasureSettings(gaze_stream="eyes"))
     with pytest.raises(RecordingError, match=r"by a stream 'eye'; did you mean 'eyes'\? there"):
@@ -196,7 +196,7 @@ def test_gaze_is_measured_on_none_of_two_views_of_the_operator_and_the_record_sa
     assert unmeasured(session) == [
         (
             "eyes",
-            "is in pixels of the window, and of the operator's views 'boom' and 'cab' nobody says "
-            "which; join it by hand with labcrane.analysis.gaze.looks_on_screen (docs/devices.md)",
+            "is in pixels of the window, but it is unknown of which view ('boom' and 'cab'); "
+            "join it manually with labcrane.analysis.gaze.looks_on_screen (docs/devices.md)",
         )
     ]

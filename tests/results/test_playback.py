@@ -119,8 +119,8 @@ def test_what_cannot_be_shown_is_said_in_words(
         next(played(reel, 1e6, 1.0, clock.now, clock.rest))
     for words, said in (
         (["--show"], "neither views nor sounds"),
-        (["--show", "--speed", "0"], "a speed of 0 shows nothing"),
-        (["--from", "3"], "give --show too"),
+        (["--show", "--speed", "0"], "a speed of 0 is not possible"),
+        (["--from", "3"], "--from needs --show; add it"),
     ):
         assert main(["replay", str(file), *words]) != 0
         told = capsys.readouterr()

@@ -179,8 +179,8 @@ def test_time_outs_are_told_by_condition_with_a_median_in_which_they_take_longer
     results = Results("", *[nothing] * 6, counts, factors, 1, nothing)
     (said,) = paragraphs(results, STYLES["html"])
     assert said.strip() == (
-        "Of 15 trials, 6 (40.0 %) ended by time-out. Successes alone look fast; in the medians a "
-        "time-out takes longer than it was allowed: "
+        "Of 15 trials, 6 (40.0 %) ended by time-out. Means of successes alone look fast; in the "
+        "medians time-outs are censored at the limit: "
         "4 m: 2 of 5, mean of successes 4.67 s, median 9 s; "
         "6 m: 4 of 5, mean of successes 4 s, over half given up."
     )
@@ -205,7 +205,7 @@ def test_a_mean_of_two_people_has_no_bar_in_figures_and_its_interval_in_the_tabl
     assert (three > 0.0).all()
     few = drawing.table[drawing.table["distance"] == 2.0]
     assert (few["ci_high"] > few["mean"]).all()
-    assert "where three or more are in it" in drawing.caption
+    assert "for three or more participants" in drawing.caption
 
 
 def test_means_of_dwell_say_how_much_of_gaze_is_known_and_how_many_movements_lost_half() -> None:
@@ -334,7 +334,7 @@ def test_a_time_to_rest_is_an_outcome_of_its_own_where_taps_end_movements() -> N
     by_tap.loc[5:6, ["onset_to_rest", "at_rest"]] = np.nan, 0.1
     assert report._rests(by_tap).endswith(
         "7 of 1152 movements have none: in 5 the tip still moved when they were ended, in 2 it had "
-        "not rested for as long as a rest is."
+        "not rested long enough."
     )
 
 
@@ -394,7 +394,7 @@ def test_wrong_words_are_refused(
     assert "; write --set NAME=VALUE, where tables has streams" in said
     assert "tables.streams is " in said
     assert main(["export", str(data), "--to", "bids", "--out", out, "--set", "every"]) == 2
-    assert "--set 'every' sets nothing; write NAME=VALUE" in capsys.readouterr().err
+    assert "--set 'every' is not an assignment; write NAME=VALUE" in capsys.readouterr().err
 
 
 @pytest.mark.slow

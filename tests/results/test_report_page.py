@@ -171,11 +171,12 @@ def test_the_answer_has_design_people_effects_quality_and_exclusions_with_their_
         "2 sessions of 2,000 ticks: 3 were late (0.150%), the worst by 12.5 ms."
     )
     assert found["Data quality"][1:] == [
-        "Time stamps by their sync reports: 1 WARN, 1 PASS.",
-        "Not there in a rehearsal, and not judged: eeg, gaze.",
+        "Timestamps by their sync reports: 1 WARN, 1 PASS.",
+        "Absent in a rehearsal, and not judged: eeg, gaze.",
     ]
     assert found["Exclusions"] == [
-        f"1 of {len(lost)} movements count for no average (0.1%); each is listed with why."
+        f"1 of {len(lost)} movements are excluded from means (0.1%); each is listed with its "
+        "reason.",
     ]
     assert "Left out: " in found["Participants"][1]
 
@@ -230,8 +231,8 @@ def test_the_answer_names_movements_without_an_onset(movements: pd.DataFrame, da
     onset = np.where(still, np.nan, 0.4)
     found = told(movements.assign(movement_onset=onset), data)
     assert found["Exclusions"] == [
-        f"2 of {len(movements)} movements count for no average (0.2%); each is listed with why. "
-        "Without an onset: P003 trial 17, P008 trial 17."
+        f"2 of {len(movements)} movements are excluded from means (0.2%); each is listed with its "
+        "reason. Without an onset: P003 trial 17, P008 trial 17."
     ]
 
 

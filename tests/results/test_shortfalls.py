@@ -148,7 +148,7 @@ def test_a_test_of_the_whole_sample_says_nothing_of_n(found) -> None:
     results, page = found(drawn(3, (5, 5)))
     assert " of 10 people" not in in_words(results)
     assert results.shortfalls.empty
-    assert "Every planned test was made, of everybody and every level." in page
+    assert "Every planned test was made with all participants and levels." in page
 
 
 @pytest.mark.slow
@@ -178,13 +178,13 @@ def test_a_level_that_nobody_reached_is_named_and_one_that_is_left_is_no_factor(
     rows = results.shortfalls
     own = rows[rows["factor"] == "distance"]
     assert own[["without", "why"]].to_numpy().tolist() == [
-        ["distance 6", "nobody has a value there"]
+        ["distance 6", "no participant has a value there"]
     ]
     results, _ = found(given_up(table, table["far_side"] == "right"))
     said = in_words(results)
     assert (
-        "Not tested over far_side, distance and far_side: nobody has a value at far_side right."
-        in said
+        "Not tested over far_side, distance and far_side: no participant has a value at far_side "
+        "right." in said
     )
 
 
@@ -193,7 +193,7 @@ def test_where_nothing_can_be_tested_all_of_it_is_named_and_trends_too(found) ->
     assert results.anova.empty
     said = in_words(results)
     assert said.startswith(
-        "Movement time, from onset to offset, was tested by no analysis of variance."
+        "Movement time, from onset to offset, was not tested by an analysis of variance."
     )
     rows = set(results.shortfalls["factor"])
     assert rows == {
@@ -208,4 +208,4 @@ def test_positions_that_cannot_be_told_from_pairs_are_named(found) -> None:
     table = drawn(7, (8,), sessions=1)
     table["pair"] = "pair " + table["sequence"].astype(str)
     results, _ = found(table)
-    assert "positions cannot be told from pairs of targets" in in_words(results)
+    assert "positions cannot be distinguished from pairs of targets" in in_words(results)

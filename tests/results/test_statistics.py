@@ -597,11 +597,11 @@ def test_a_measure_that_is_the_same_in_all_is_tested_by_nothing(
 @pytest.mark.parametrize(
     ("values", "why"),
     [
-        (lambda t: 2.0 * t["difficulty"], "no scatter"),
-        (lambda t: t["participant"].factorize()[0] * 0.1, "no scatter"),
-        (lambda t: t["participant"].factorize()[0] * t["sequence"], "no scatter"),
-        (lambda t: t["sequence"] / 3.0, "no scatter"),
-        (lambda t: (t["group"] == "visual") * 1.0, "no scatter"),
+        (lambda t: 2.0 * t["difficulty"], "no residual variance"),
+        (lambda t: t["participant"].factorize()[0] * 0.1, "no residual variance"),
+        (lambda t: t["participant"].factorize()[0] * t["sequence"], "no residual variance"),
+        (lambda t: t["sequence"] / 3.0, "no residual variance"),
+        (lambda t: (t["group"] == "visual") * 1.0, "no residual variance"),
         (lambda t: t["y"].where(t["y"] < t["y"].max(), np.inf), "some values are infinite"),
     ],
 )

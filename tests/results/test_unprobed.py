@@ -27,7 +27,7 @@ def test_an_export_refuses_streams_never_probed_unless_told_and_says_so(
     export = ["export", str(unprobed), "--to", "tables"]
     assert main([*export, "--out", str(tmp_path / "no")]) == 1
     said = " ".join(capsys.readouterr().err.split())
-    assert "nobody knows how right the times are of eyes of P001, session 1 (12 of" in said
+    assert "timestamp accuracy of eyes of P001, session 1 (12 of" in said
     assert "--accept-unprobed" in said
     assert not (tmp_path / "no").exists()
     assert main([*export, "--out", str(tmp_path / "yes"), "--accept-unprobed"]) == 0
@@ -48,4 +48,4 @@ def test_a_report_refuses_streams_never_probed_unless_told_and_says_so(
     assert not (tmp_path / "report").exists()
     assert main([*report, "--accept-unprobed"]) == 0
     said = " ".join((tmp_path / "report" / "report.html").read_text(encoding="utf-8").split())
-    assert "nobody knows how right their times are: eyes of P001, session 1 (12 of" in said
+    assert "timestamp accuracy is unknown: eyes of P001, session 1 (12 of" in said

@@ -486,7 +486,7 @@ def test_the_paragraph_says_sizes_intervals_and_what_was_tested() -> None:
     [
         (["--claim", "equivalent"], "did you mean 'equivalence'?"),
         (["--claim", "equivalence"], "equivalence is shown against a margin"),
-        (["--goal", "much"], "--goal 'much' is no list of powers; write 0.8,0.9"),
+        (["--goal", "much"], "--goal 'much' is not a list of powers; write 0.8,0.9"),
     ],
 )
 def test_what_cannot_be_shown_is_refused_before_anybody_is_simulated(

@@ -570,15 +570,18 @@ def test_who_leaves_before_a_first_movement_is_named_and_drawn(
     }
     gone = sorted(name for name, table in tables.items() if table.empty)
     assert 0 < len(gone) < 14
-    assert f"without a movement that counts: {', '.join(gone)}; they are drawn as the" in said
+    assert f"without a counted movement: {', '.join(gone)}; they are sampled like the" in said
     assert "14 participants were simulated" in (where / "sample_size.md").read_text()
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--test", "anvoa"], "--test 'anvoa' is no test; did you mean 'anova'?"),
-        (["--test", "anova", "--resimulate", "3"], "--resimulate makes fresh participants"),
+        (["--test", "anvoa"], "--test 'anvoa' is not a test; did you mean 'anova'?"),
+        (
+            ["--test", "anova", "--resimulate", "3"],
+            "--resimulate is for the t test of new participants",
+        ),
         (["--recordings", "nowhere"], "there is no data folder nowhere"),
     ],
 )

@@ -183,7 +183,7 @@ def test_an_interrupt_by_hand_says_who_is_there_and_the_same_command_makes_the_o
     assert program.returncode == 128 + signal.SIGINT, said
     there = len(list(data.glob("P*")))
     assert 1 <= there < 40
-    assert f"interrupted: {there} of 40 participants are in {data}, whole; the same" in said
+    assert f"interrupted: {there} of 40 participants are complete in {data}; run the same" in said
     assert "Traceback" not in said
     assert main([*words[:-1], "6"]) == 0
     first = {path: each for path, each in digests(data).items() if path[:4] in NAMES}

@@ -154,7 +154,7 @@ def test_the_command_tells_bias_and_spread_and_is_the_same_again(
     ("text", "words", "message"),
     [
         (STUDY, [], "track 'stairs' is a staircase, and says nothing of how steeply"),
-        (STUDY, ["--spread", "0"], "--spread 0 is no spread; give numbers above 0"),
+        (STUDY, ["--spread", "0"], "--spread 0 is not a spread; give numbers above 0"),
         (STUDY.replace(", track: quest", "").replace(", track: stairs", ""), [], "has a track"),
         (
             STUDY.replace("rounds: 12", "rounds: 2")

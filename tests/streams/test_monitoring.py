@@ -360,7 +360,7 @@ def test_the_watch_fits_eighty_columns_and_cuts_nothing_off() -> None:
         "BrainVision amplifier of room 12: EEG, 64 channels at 1000 Hz, in microvolts",
         "clock -12345.678901 s, -43.2 ppm, round trip 0.31 ms",
         "20 at once, 340 at most, jitter 1.23 ms",
-        "12 gaps, the longest 1.250 s, 4 lost by its counter, 2 stamps out of order",
+        "12 gaps, the longest 1.250 s, 4 lost by its counter, 2 timestamps out of order",
         "E0, E1, E2, E3, E4, E5 and 58 more: MAINS HUM: E0 0 µV at 50 Hz",
     ):
         assert words in text

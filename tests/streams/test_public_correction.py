@@ -51,11 +51,11 @@ def test_a_lag_that_may_be_a_clock_behind_is_in_the_uncertainty(
     [
         ({"stamps": np.zeros((3, 2))}, r"stamps must have the shape \(n,\), but have \(3, 2\)"),
         ({"arrivals": np.zeros(4)}, r"arrivals must have the shape \(3,\), one per stamp"),
-        ({"counter": [0.0, np.nan, 2.0]}, "counter hold what is no number"),
+        ({"counter": [0.0, np.nan, 2.0]}, "counter contain values that are not numbers"),
         ({"probes": np.zeros((5, 4))}, "remote time, offset, round trip; they have the shape"),
         (
             {"probes": [[0.0, 0.0, 1e-3], [1.0, 0.0, -1e-3]]},
-            "are -0.001 s at least; none is negative",
+            "are -0.001 s at least; they must not be negative",
         ),
         ({"rate_hz": np.nan}, "rate_hz is nan; it must be a finite number and not negative"),
         ({"rate_hz": -3.0}, "rate_hz is -3.0; it must be a finite number and not negative"),
@@ -268,7 +268,7 @@ def test_what_of_an_xdf_file_could_not_be_read_is_told(
     assert main(["resync", str(path)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert re.search(
-        r"others.xdf: its last \d+ bytes are no whole chunk of XDF and were left", said
+        r"others.xdf: its last \d+ bytes are not a complete XDF chunk and were left", said
     )
 
 

@@ -1,4 +1,4 @@
 """Electrodes: a stream of EEG and the like as samples of one rate, with events at their samples.
 
-In comes a stream of a participant file; out goes what programs for EEG need, and an MNE object.
+Input: a stream of a participant file. Output: the data for EEG programs, and an MNE object.
 """

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 EEG = "EEG"
 
 EEG_READERS = "pip install 'labcrane[eeg]'"
-"""How to get what reads and writes EEG."""
+"""How to install the readers and writers of EEG."""
 
 KINDS = {
     "EEG": "eeg", "EOG": "eog", "ECG": "ecg", "EKG": "ecg", "EMG": "emg", "GSR": "gsr",
@@ -34,12 +34,12 @@ ELECTRIC = ("eeg", "eog", "ecg", "emg")
 FAULT_COLUMNS = (("channel", object), ("kind", object), ("start", float), ("end", float))
 
 GAP = "BAD_gap"
-"""Annotation at which samples are missing: MNE leaves out epochs that go over one."""
+"""Annotation of missing samples: MNE leaves out epochs that overlap one."""
 
 
 FAULT = "fault"
-"""How annotations of a channel's faults begin; they are no ``BAD``, which MNE takes for all
-channels at once."""
+"""Prefix of annotations of a channel's faults; it is not ``BAD``, which MNE applies to all
+channels."""
 
 
 def eeg_streams(session: SessionRecord) -> list[Stream]:
@@ -55,10 +55,10 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
     by the corrected clock; those outside of the recording are left out. Annotations are called by
     labels (docs/markers.md). Several are at one sample, so choose those of one name before epochs
     are made: ``mne.events_from_annotations(raw, regexp="^trial_start/")``. Where samples are
-    missing is ``BAD_gap``. What people marked afterwards is ``annotation/`` and its text; a mark
-    whose text begins with ``BAD`` stays as it is. What monitors told of a channel is ``fault/`` and
-    its kind, of that channel alone (``ch_names``): which channels are bad is for the analyst to
-    say.
+    missing is ``BAD_gap``. Annotations made in the viewer are ``annotation/`` and their
+    text; a text that begins with ``BAD`` is not prefixed. Faults that monitors reported on a
+    channel are ``fault/`` and their kind, for that channel alone (``ch_names``): the analyst
+    decides which channels are bad.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
     stream
         Name of the stream; the only one of type ``EEG`` by default.
     unit
-        In which numbers of channels are whose unit the source does not state: ``microvolts``.
+        Unit of channels whose unit the source does not state: ``microvolts``.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
 
 
 def faults_of(session: SessionRecord, stream: Stream) -> "pd.DataFrame":
-    """Return the faults that monitors told of a stream: channel, kind, start and end in s, ...
+    """Return the faults that monitors reported on a stream: channel, kind, start, end in s, ...
 
     A channel is empty for the whole stream; an end is infinite where the fault lasted.
     """
@@ -142,12 +142,12 @@ def faults_of(session: SessionRecord, stream: Stream) -> "pd.DataFrame":
 
 
 def _marked(text: str) -> str:
-    """Return what a mark is called; MNE leaves out epochs that go over one that begins with BAD."""
+    """Return the name of an annotation; MNE leaves out epochs that overlap one named BAD..."""
     return text if text.upper().startswith("BAD") else f"annotation/{text}"
 
 
 def events_at(session: SessionRecord, signal: Sampled) -> tuple[Any, list[str]]:
-    """Return at which samples events happened, with fractions, and the events' labels.
+    """Return the samples of events, with fractions, and the events' labels.
 
     Those outside of the recording are left out.
     """
@@ -160,20 +160,20 @@ def events_at(session: SessionRecord, signal: Sampled) -> tuple[Any, list[str]]:
 
 
 def channel_types(signal: Sampled, stream: Stream) -> tuple[str, ...]:
-    """Return MNE's type of each channel; one that states none is what its stream is."""
+    """Return MNE's type of each channel; by default that of its stream."""
     usual = str(stream.attrs.get("type", ""))
     return tuple(KINDS.get((kind or usual).upper(), "misc") for kind in signal.kinds)
 
 
 def volts(signal: Sampled, stream: Stream, unit: str = "") -> Any:
-    """Return by what each channel is multiplied to be in volts, shape ``(n_channels,)``.
+    """Return the factor of each channel to volts, shape ``(n_channels,)``.
 
-    Channels that are nothing electric stay as they are.
+    Channels that are not electric are unchanged.
 
     Raises
     ------
     RecordingError
-        An electric channel's unit is neither stated nor given, or it is no voltage.
+        An electric channel's unit is neither stated nor given, or is not a voltage.
     """
     kinds = channel_types(signal, stream)
     scale = np.ones(len(kinds))
@@ -192,9 +192,9 @@ def _volts(unit: str, channel: str) -> float:
     try:
         microvolts = in_unit(f"1 {unit}", "uV")
     except ValueError as error:
-        raise RecordingError(f"channel {channel} is in no voltage: {error}") from error
+        raise RecordingError(f"the unit of channel {channel} is not a voltage: {error}") from error
     if microvolts is None:
-        raise RecordingError(f"channel {channel} is in {unit!r}, which is no unit of a voltage")
+        raise RecordingError(f"the unit {unit!r} of channel {channel} is not a voltage")
     return 1e-6 * microvolts
 
 
@@ -208,6 +208,6 @@ def _chosen(session: SessionRecord, name: str | None) -> Stream:
     if len(found) != 1:
         names = ", ".join(repr(stream.name) for stream in found) or "none"
         raise RecordingError(
-            f"the session's streams of type {EEG!r} are {names}; say which one: stream='NAME'"
+            f"the session's streams of type {EEG!r} are {names}; choose one: stream='NAME'"
         )
     return found[0]

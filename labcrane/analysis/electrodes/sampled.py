@@ -1,4 +1,4 @@
-"""Sampled signal: a stream as its samples, one after another, and which sample a time is at."""
+"""Sampled signal: a stream as consecutive samples, and the sample of each time."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,24 +13,24 @@ from labcrane.recording.participant_file.reader import Stream
 from labcrane.types import FloatArray
 
 NOMINAL = 1e-3
-"""Share by which a source may miss the rate that it states: clocks do by 1e-4 at most."""
+"""Tolerated relative error of a source's stated rate: clocks differ by 1e-4 at most."""
 
 LOST = 1.5
 """Sample periods between two samples from which on some between them are missing."""
 
 EVEN = 0.2
-"""Share by which the usual step of evened stamps may miss a period."""
+"""Share by which the usual step of dejittered timestamps may miss a period."""
 
 SILENT_S = 1.0
-"""Seconds without a sample from which on some are missing though stamps come in bursts."""
+"""Seconds without a sample from which on some are missing although timestamps come in bursts."""
 
 
 @dataclass(frozen=True)
 class Sampled:
     """A stream of numbers at a steady rate.
 
-    The samples are as they were recorded, none is interpolated. Whatever the source's clock did,
-    and wherever samples are missing, :meth:`at` says at which sample a time of the session is.
+    The samples are as they were recorded, none is interpolated. For any behaviour of the
+    source's clock and any missing samples, :meth:`at` gives the sample of a session's time.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Sampled:
             yield np.column_stack([values[name] for name in self.labels]).astype(np.float64)
 
     def at(self, times: FloatArray) -> FloatArray:
-        """Return the samples at which something happened, counted from 0, with fractions.
+        """Return the samples of times, counted from 0, with fractions.
 
         Parameters
         ----------
@@ -89,26 +89,26 @@ def sampled(stream: Stream) -> Sampled:
     Raises
     ------
     RecordingError
-        It holds texts, has fewer than two samples, or its clock was not corrected.
+        It contains texts, has fewer than two samples, or its clock was not corrected.
     """
     header = stream.header
     if header is None or not stream.attrs["corrected"]:
         raise RecordingError(
             f"stream {stream.name!r} is one of the session's own, or its clock was not corrected, "
-            "so that nothing is known to be at any sample of it; labcrane resync tries again"
+            "so its samples have no times on the session's clock; run labcrane resync to try again"
         )
     numeric, count = stream.numeric, len(stream)
     if len(numeric) != len(stream.units) or count < 2:  # noqa: PLR2004 - for a rate
         raise RecordingError(
-            f"stream {stream.name!r} holds {count} samples of {len(numeric)} channels "
-            "of numbers; a signal needs two samples, and numbers alone"
+            f"stream {stream.name!r} has {count} samples and {len(numeric)} numeric "
+            "channels; a signal needs two or more samples, and numeric channels only"
         )
     time = np.maximum.accumulate(stream.column("time"))
     steps = np.diff(time)
     rate_hz = _rate(header.rate_hz, steps)
     if not rate_hz:
         raise RecordingError(
-            f"stream {stream.name!r} states no rate, and its samples have no time between them; "
+            f"stream {stream.name!r} states no rate, and its samples all have the same time; "
             "set the rate in the program that sends it"
         )
     even = abs(float(np.median(steps)) * rate_hz - 1.0) <= EVEN

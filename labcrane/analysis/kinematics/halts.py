@@ -10,15 +10,15 @@ from labcrane.types import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Halts:
-    """How a movement is made of strokes.
+    """The strokes of a movement.
 
     Attributes
     ----------
     count, seconds
-        Halts between onset and offset, and how long they are together, in s.
+        Halts between onset and offset, and their total duration, in s.
     main_stroke_s
         Of the stroke with the highest speed, from the halt or the rest before it to that behind it,
-        in s; 0 where no stroke is long enough to be one.
+        in s; 0 where no stroke is long enough.
     """
 
     count: int
@@ -29,9 +29,9 @@ class Halts:
 def halts(elapsed: FloatArray, speed: FloatArray, *, threshold: float, hold_s: float) -> Halts:
     """Return the halts of a movement.
 
-    A stroke is what is faster than ``threshold`` for at least ``hold_s``, as an onset is; a halt is
-    at least ``hold_s`` between two strokes. So noise that passes the threshold for a moment makes
-    no halt and ends none. The rest in which a movement ends is no halt, and belongs to no stroke.
+    In a stroke the tip is faster than ``threshold`` for at least ``hold_s``, as at an onset; a halt
+    is at least ``hold_s`` between two strokes. So noise that passes the threshold briefly makes
+    no halt and ends none. The final rest of a movement is not a halt, and belongs to no stroke.
 
     Parameters
     ----------

@@ -16,10 +16,10 @@ def onset(
 
     The first tick, from the front, of the first stretch in which the tip is faster than
     ``threshold`` for at least ``hold_s``, however fast it becomes later: strokes before a halt are
-    part of the movement. The threshold is absolute, above what the sensors tell of a tip at rest: a
-    share of the peak speed would make the onset of slow and of fast movements two things.
+    part of the movement. The threshold is absolute, above the sensor noise of a tip at rest: with a
+    share of the peak speed, the onsets of slow and of fast movements would not be comparable.
 
-    What is fast from the first tick on is how the movement before runs out, and no onset, unless it
+    Speed from the first tick on is the end of the movement before, and not an onset, unless the tip
     comes nearer to the target by ``nearer``.
 
     Parameters
@@ -47,8 +47,8 @@ def onset(
 def reaction(elapsed: FloatArray, command: FloatArray) -> float:
     """Return when a stick first left its dead zone, in s since the trial's start; NaN for never.
 
-    A command is 0 while all sticks are in their dead zones. A stick that is held from the movement
-    before answers nothing: only a command after a tick without one is a reaction.
+    A command is 0 while all sticks are in their dead zones. A stick that is held since the movement
+    before is not a reaction: only a command after a tick without one is a reaction.
 
     Parameters
     ----------
@@ -63,6 +63,6 @@ def reaction(elapsed: FloatArray, command: FloatArray) -> float:
 
 
 def _stretches(on: np.ndarray) -> list[slice]:
-    """Return where something holds without a break."""
+    """Return the spans in which a condition holds continuously."""
     turns = np.flatnonzero(np.diff(on, prepend=False, append=False))
     return [slice(int(a), int(b)) for a, b in zip(turns[::2], turns[1::2], strict=True)]

@@ -75,7 +75,7 @@ def ldlj(
 
 
 FINE = 8
-"""Points of a spline between two samples, where a square of it is summed up."""
+"""Points of a spline between two samples, at which its square is summed."""
 
 
 def sub_movements(
@@ -95,7 +95,7 @@ def sub_movements(
 
 
 def low_pass(values: FloatArray, rate_hz: float, cutoff_hz: float) -> FloatArray:
-    """Return values without what is faster than a frequency, and as late as they were.
+    """Return values low-pass filtered, without delay.
 
     The gain of a Butterworth filter of second order run forwards and backwards, with -3 dB of both
     together at ``cutoff_hz``: ``1 / (1 + (√2 - 1) (f / cutoff)⁴)``. It is applied to the sine
@@ -134,9 +134,9 @@ def low_pass(values: FloatArray, rate_hz: float, cutoff_hz: float) -> FloatArray
 
 
 def path_ratio(tip: FloatArray) -> float:
-    """Return the length of the way over the straight distance between its ends, 1 or more.
+    """Return the path length divided by the straight distance between its ends, 1 or more.
 
-    ``tip`` is in metres, shape ``(n, 3)``. NaN for a way that ends where it began.
+    ``tip`` is in metres, shape ``(n, 3)``. NaN for a path that ends where it began.
     """
     straight = float(np.linalg.norm(tip[-1] - tip[0]))
     length = float(np.linalg.norm(np.diff(tip, axis=0), axis=1).sum())

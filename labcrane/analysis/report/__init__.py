@@ -1,4 +1,4 @@
 """The report of a cohort: HTML pages, figures and the evaluation workbook.
 
-In comes a cohort with its measures; out go files for a reader without Python.
+Input: a cohort with its measures. Output: files for a reader without Python.
 """

@@ -1,4 +1,4 @@
-"""Answer of a study: what stands on the first page of its report, in words with their numbers."""
+"""Answer of a study: the first page of its report, in words with their numbers."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -44,18 +44,18 @@ def answer(
     about: str,
     results: Results | None,
 ) -> dict[str, list[str]]:
-    """Return the paragraphs of the first page by what they are about.
+    """Return the paragraphs of the first page by topic.
 
     Parameters
     ----------
     everything
-        All movements, also those that count for nothing.
+        All movements, also those excluded from means.
     quality
         Tables of the loop and of the clocks.
     about
         The sample in a sentence.
     results
-        What was tested; None for a study of which nothing is.
+        The tests; None for a study without tests.
     """
     return {
         "Design": [_design(cohort, everything, results)],
@@ -72,7 +72,7 @@ def _design(cohort: Cohort, everything: "pd.DataFrame", results: Results | None)
     said = f"{context.get('title') or context.get('study', 'A study')}: "
     said += f"{sessions} {'session' if sessions == 1 else 'sessions'} with movements"
     if results is None:
-        return f"{said}. Nothing of it is tested here."
+        return f"{said}. No tests were made."
     factors = results.factors
     within = [name for name, _, _ in _columns(factors) if name != GROUP]
     between = (
@@ -102,13 +102,13 @@ def _columns(factors: Factors) -> Iterator[tuple[str, str, str]]:
 def _left_out(cohort: Cohort) -> list[str]:
     counts = Counter(str(person.status) for person in cohort.left_out)
     if not counts:
-        return ["Nobody's recording was left out."]
+        return ["All recordings are included."]
     listed = ", ".join(f"{count} {status}" for status, count in counts.items())
     return [f"Left out: {listed}; each with the reason in the table of participants."]
 
 
 def _untested(results: Results | None) -> list[str]:
-    """Return who of the sample is not in each of the tests, and where it says why."""
+    """Return who of the sample is not in every test, and where the reasons are."""
     if results is None:
         return []
     tables = (results.anova, results.contrasts, results.trends, results.gaze, results.scores)
@@ -121,7 +121,7 @@ def _untested(results: Results | None) -> list[str]:
     if not names:
         return []
     said = people_in_words(sorted(names))
-    return [f"Not in every test, for the reason that stands with each: {said}."]
+    return [f"Not in every test, for the reasons given: {said}."]
 
 
 def _effects(everything: "pd.DataFrame", results: Results | None) -> list[str]:
@@ -142,7 +142,7 @@ def _effects(everything: "pd.DataFrame", results: Results | None) -> list[str]:
         ]
         short = lacking(_of_effects(results), str(measure), STYLE)
         if said or short:
-            effects = "; ".join(said) or "was tested by no analysis of variance"
+            effects = "; ".join(said) or "was not tested by an analysis of variance"
             about = f"{NAMES.get(str(measure), str(measure))} {effects}."
             standing = _standing(str(measure), results.primary)
             found.append(" ".join([*standing, about, *short]))
@@ -150,14 +150,14 @@ def _effects(everything: "pd.DataFrame", results: Results | None) -> list[str]:
 
 
 def _standing(measure: str, primary: Sequence[str]) -> list[str]:
-    """Return what the protocol calls an outcome; nothing where it names no primary ones."""
+    """Return the protocol's word for outcomes; empty if it names no primary ones."""
     if not primary:
         return []
     return ["Primary outcome:" if measure in primary else "Further outcome:"]
 
 
 def _of_effects(results: Results) -> "pd.DataFrame":
-    """Return the shortfalls but for who is missing from what the answer does not tell."""
+    """Return the shortfalls without people missing from tests that the answer leaves out."""
     table = results.shortfalls
     if not len(table):
         return table
@@ -166,7 +166,7 @@ def _of_effects(results: Results) -> "pd.DataFrame":
 
 
 def _factor_of(effect: str) -> str:
-    """Return the factor of an effect, wherever and beside whatever it is."""
+    """Return the factor of an effect, without its phase and adjustment."""
     return effect.partition(" ")[0]
 
 
@@ -184,11 +184,11 @@ def _effect(
 ) -> str:
     """Return ``differed over distance (2 m: 3.21 s, 6 m: 5.40 s; F(1, 35) = 90.1, p < .001)``.
 
-    The means are of those who are in the test, each cell of its design counting alike.
+    The means are of those who are in the test, with equal weights of its design's cells.
     """
     name, measure = str(row["factor"]), str(row["measure"])
     if row["confounded"]:
-        return f"what {name} does cannot be told from {row['confounded']}"
+        return f"the effect of {name} cannot be distinguished from {row['confounded']}"
     said = "differed over" if row["p_gg"] < LEVEL else "did not detectably differ over"
     if name.endswith(ADJUSTED):  # the means are those of the plain test, before it
         return f"{said} {name} ({f_test(row, STYLE, results.people)})"
@@ -223,15 +223,15 @@ def _quality(loops: "pd.DataFrame", syncs: "pd.DataFrame") -> Iterator[str]:
     verdicts = Counter(word for word in loops["sync_verdict"].astype(str) if word)
     if verdicts:
         listed = ", ".join(f"{count} {word}" for word, count in verdicts.most_common())
-        yield f"Time stamps by their sync reports: {listed}."
+        yield f"Timestamps by their sync reports: {listed}."
     absent = [name for each in loops["not_there"] for name in each.split(", ") if name]
     if absent:
         names = ", ".join(dict.fromkeys(absent))
-        yield f"Not there in a rehearsal, and not judged: {names}."
+        yield f"Absent in a rehearsal, and not judged: {names}."
     if len(syncs):
         unknown = int((syncs["corrected"] == "no").sum())
         yield (
-            f"{len(syncs)} streams of others were recorded, {unknown} of them without a time on "
+            f"{len(syncs)} external streams were recorded, {unknown} of them without a time on "
             "the session's clock."
         )
 
@@ -240,7 +240,10 @@ def _exclusions(everything: "pd.DataFrame") -> str:
     count = len(everything)
     out = count - int(is_result(everything).sum()) if count else 0
     share = f" ({out / count:.1%})" if count else ""
-    said = f"{out} of {count} movements count for no average{share}; each is listed with why."
+    said = (
+        f"{out} of {count} movements are excluded from means{share}; each is listed with its "
+        "reason."
+    )
     unseen = everything[not_presented(everything)]
     if len(unseen):
         people = unseen["participant"].nunique()

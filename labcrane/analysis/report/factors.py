@@ -17,7 +17,7 @@ CONDITION = "condition"
 
 @dataclass(frozen=True, slots=True)
 class Factors:
-    """What varies in a study.
+    """Factors of a study.
 
     Attributes
     ----------
@@ -26,22 +26,22 @@ class Factors:
     phases
         Sessions, or blocks where a session has several, in order.
     kind
-        What a phase is: ``session``, ``block`` or ``phase`` where both vary.
+        Kind of a phase: ``session``, ``block`` or ``phase`` where both vary.
     places
         Positions of pairs of targets in each phase.
     practice
         Whether there was practice.
     targets
-        Levels of distance and side that were to be done, where there are several.
+        Planned levels of distance and side, where there are several.
     crossed
         Levels of session and block where both vary and each session has the same blocks; they are
         two factors then, and otherwise phases are one.
     conditions
-        Within participants, two or more, in whatever order each had them; otherwise empty.
+        Within participants, two or more, in any order; otherwise empty.
     people
-        Everybody in the sample, also who has no movement, and their group.
+        All participants in the sample, even without movements, and their groups.
     uneven
-        In a sentence, where conditions did not come equally often; empty where they did.
+        A sentence if conditions were not equally frequent; empty otherwise.
     """
 
     groups: tuple[str, ...]
@@ -67,7 +67,7 @@ class Factors:
 
     @property
     def by_phase(self) -> list[str]:
-        """The column that tells phases apart, where there are several."""
+        """The column that distinguishes phases, where there are several."""
         return [PHASE] if len(self.phases) > 1 else []
 
     @property
@@ -76,7 +76,7 @@ class Factors:
         return self.kind == "phase" and not self.crossed
 
     def levels(self, column: str) -> tuple[Any, ...]:
-        """Return the levels of a column that were to be done; a phase of few places has fewer."""
+        """Return the planned levels of a column; a phase of few places has fewer."""
         if column == PLACE:
             return tuple(map(float, range(1, max(self.places.values(), default=0) + 1)))
         own = {GROUP: self.groups, PHASE: self.phases, CONDITION: self.conditions}
@@ -92,8 +92,8 @@ def with_factors(movements: "pd.DataFrame") -> "pd.DataFrame":
     """Return movements with the columns ``group``, ``phase``, its two parts, and ``place``.
 
     A phase is a session, or a block where a session has several; a place is the position in it of a
-    pair of targets, from 1. So positions of two sessions are never one. All movements are to be
-    here, also those that count for nothing: a place whose movements all failed is still one.
+    pair of targets, from 1. So positions of two sessions never merge. ``movements`` must be
+    complete, with those excluded from means: a place whose movements all failed is still one.
     """
     table = movements.copy()
     for name in (GROUP, "session_name", "block_name"):
@@ -146,12 +146,12 @@ def _names(table: "pd.DataFrame", counted: "pd.Series[bool]") -> list[str]:
 
 
 def factors_of(table: "pd.DataFrame", people: Mapping[str, str] | None = None) -> Factors:
-    """Return what varies, from movements :func:`with_factors`.
+    """Return the factors of movements :func:`with_factors`.
 
     Parameters
     ----------
     people
-        Everybody in the sample, and their group; who has movements, if it is not told.
+        All participants in the sample, and their groups; by default those with movements.
     """
     counted = table[table["practice"].astype(float) == 0.0]
     groups = tuple(sorted(name for name in counted[GROUP].unique() if name))
@@ -180,7 +180,7 @@ def factors_of(table: "pd.DataFrame", people: Mapping[str, str] | None = None) -
 
 
 def conditions_in(table: "pd.DataFrame") -> tuple[str, ...]:
-    """Return the conditions within participants that movements are of, where there are several."""
+    """Return the movements' conditions within participants, where there are several."""
     if CONDITION not in table:
         return ()
     named = {str(name) for name in table[CONDITION].dropna().unique() if name != ""}
@@ -190,9 +190,9 @@ def conditions_in(table: "pd.DataFrame") -> tuple[str, ...]:
 def _uneven(results: "pd.DataFrame", conditions: tuple[str, ...]) -> str:
     """Return the first phase in which some conditions had more people than others, in a sentence.
 
-    Of those who have results of all conditions, and so are in their test. What people learn from
-    phase to phase is then in part in the differences between conditions. Where all had one order,
-    tests say that it is confounded.
+    For those who have results of all conditions, and so are in their test. Differences between
+    conditions then include part of the learning from phase to phase. If all had the same order,
+    tests report the confound.
     """
     had = results[results[CONDITION].isin(conditions)]
     had = had.drop_duplicates(["participant", PHASE, CONDITION])
@@ -206,9 +206,9 @@ def _uneven(results: "pd.DataFrame", conditions: tuple[str, ...]) -> str:
         people = [f"{name} for {counts.get(name, 0)}" for name in conditions]
         if counts.nunique() > 1 or len(counts) < len(conditions):
             return (
-                f"Conditions did not come equally often in each place: in {phase}, "
-                f"{', '.join(people[:-1])} and {people[-1]} participants; what changes from place "
-                "to place is in part in the differences between them."
+                f"Conditions were not equally frequent at each place: in {phase}, "
+                f"{', '.join(people[:-1])} and {people[-1]} participants; differences between "
+                "conditions include part of the change from place to place."
             )
     return ""
 
@@ -230,5 +230,5 @@ def running(table: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
     for phase in factors.phases:
         before[phase] = so_far
         so_far += factors.places[phase]
-    # Without a movement, as of a test that nobody could be in, the map would be of words.
+    # Without movements, as for a test without participants, the map would be of words.
     return table.assign(sequence=table[PLACE] + table[PHASE].map(before).astype(float))

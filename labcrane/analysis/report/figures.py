@@ -30,14 +30,14 @@ WORDS = {
 
 PLACE_WORDS = "position in the sequence"
 MEANS = (
-    "Points: means over participants' means, bars: 95 % confidence intervals (t) where three or "
-    "more are in it,"
+    "Points: means over participants' means, bars: 95 % confidence intervals (t) for three or "
+    "more participants,"
 )
 LEAST = 3
-"""Participants of a mean that has a bar: of two, its interval is a multiple of what they differ."""
+"""Minimum participants of a mean with a bar: of two, it is a multiple of their difference."""
 
 MOST_NAMED = 60
-"""Participants that have their names in a figure; more of them would fill a page."""
+"""Maximum number of participants with names in a figure; more would fill a page."""
 
 LINE = 0.13
 """Inches from one name to the next."""
@@ -45,7 +45,7 @@ LINE = 0.13
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A figure, its name for files, what it shows, and its table."""
+    """A figure, its file name, its caption, and its table."""
 
     name: str
     caption: str
@@ -95,13 +95,13 @@ def over(movements: "pd.DataFrame", measure: str, by: list[str]) -> "pd.DataFram
 def by_sequence(
     movements: "pd.DataFrame", measure: str, tested: "pd.DataFrame | None" = None
 ) -> Drawing:
-    """Draw a measure over the sequence: everybody thin, the mean of each group thick.
+    """Draw a measure over the sequence: participants thin, the mean of each group thick.
 
     Parameters
     ----------
     tested
-        The movements of those who are in the test over the sequence, of whom the means are; those
-        of all where it is not given, or nobody is.
+        Movements of those in the test over the sequence, for the means; by default, or if nobody
+        is in the test, those of all.
     """
     few = tested is not None and 0 < len(tested) < len(movements)
     whose = tested if few and tested is not None else movements
@@ -160,8 +160,8 @@ def by_distance(movements: "pd.DataFrame") -> Drawing:
     caption = (
         f"Times and accuracy over the sequence, for each distance. {MEANS} of {_of(movements)}"
         f"{_at(pd.concat(tables))}, "
-        "beside each other so that they can be told apart; dots: each participant. An interval of "
-        "few participants may be wider than what is shown."
+        "side by side to be distinguishable; dots: each participant. An interval of few "
+        "participants may be wider than the figure shows."
     )
     return Drawing("sequence_by_distance", caption, panels, pd.concat(tables))
 
@@ -218,8 +218,8 @@ def _line(who: str, fit: Regression | None) -> dict[str, object]:
 def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) -> Drawing:
     """Draw participants' means and the better of both learning curves for each.
 
-    Curves count from the first position of their session or block. With too few positions to say
-    which is better, there are means alone.
+    Curves count from the first position of their session or block. With too few positions to
+    compare the curves, only means are drawn.
     """
     series = []
     fitted_to = curves[curves["measure"] == measure]
@@ -248,7 +248,7 @@ def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) ->
         f"Learning curves of {_begun(WORDS.get(measure, measure)).lower()}. Dots: each "
         f"participant's means, n = {len(people)} {_people(len(people))}; lines: the better of an "
         "exponential and a power curve"
-        + ("." if drawn else ", which positions are too few to tell here.")
+        + ("." if drawn else ", which cannot be fitted to so few positions.")
     )
     return Drawing(f"learning_{measure}", caption, [panel], curves)
 
@@ -283,7 +283,7 @@ def throughputs(table: "pd.DataFrame") -> Drawing:
 
 
 def _range(values: "pd.Series[float]") -> tuple[float, float]:
-    """Return the range of what was measured: an interval of two people would press it flat."""
+    """Return the range of the values: an interval of two people would compress the figure."""
     low, high = float(values.min()), float(values.max())
     aside = 0.08 * (high - low) or 0.1 * abs(high) or 1.0
     return low - aside, high + aside
@@ -298,7 +298,7 @@ def _people(count: int) -> str:
 
 
 def _of(movements: "pd.DataFrame", by: str = "") -> str:
-    """Return how many there are, and in which group."""
+    """Return the number of participants, and their group."""
     count = int(movements["participant"].nunique())
     said = f"n = {count} {_people(count)}"
     if not by:
@@ -313,13 +313,13 @@ def _all(movements: "pd.DataFrame") -> str:
 
 
 def _at(table: "pd.DataFrame") -> str:
-    """Return of how many a point is, where points are of different numbers of participants."""
+    """Return the numbers of participants per point, where they differ."""
     fewest, most = int(table["participants"].min()), int(table["participants"].max())
     return "" if fewest == most else f", {fewest} to {most} in a point"
 
 
 def _aside(number: int, count: int) -> float:
-    """Return how far a level stands beside its position, so that bars do not cover each other."""
+    """Return the offset of a level from its position, so that bars do not cover each other."""
     return 0.12 * (number - (count - 1) / 2.0)
 
 
@@ -334,9 +334,9 @@ def _with_ci(table: "pd.DataFrame", colour: str, label: str = "") -> Series:
 
 @styled()
 def power_curve(table: "pd.DataFrame", whose: str) -> "Figure":
-    """Return the power over the size of the cohort, beside the rate of findings in nothing.
+    """Return the power over the cohort size, with the rate of false positives.
 
-    ``whose`` says of whom the cohorts are.
+    ``whose`` names the participants whom cohorts are sampled from.
     """
     figure = new_figure()
     (axes,) = figure.axes

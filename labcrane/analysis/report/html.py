@@ -1,4 +1,4 @@
-"""HTML pages that need nothing but themselves and their pictures."""
+"""HTML pages that need only their pictures."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -28,13 +28,13 @@ class Page:
     Parameters
     ----------
     path
-        Where it will be; pictures and tables go into ``figures`` and ``tables`` beside the report.
+        Its path; pictures and tables go into ``figures`` and ``tables`` in the report's folder.
     root
         Folder of the report.
     prefix
         Put before the names of pictures and tables: the participant, on their page.
     footer
-        Below every figure, and above every text, which others take out of the page: ``SIMULATED``.
+        Label below every figure and above every text, which may leave the page: ``SIMULATED``.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class Page:
         self._sections: list[str] = []
 
     def lead(self, parts: Mapping[str, Sequence[str]]) -> None:
-        """Set what stands first: paragraphs by what they are about."""
+        """Set the first paragraphs, by topic."""
         self._lead = parts
 
     def heading(self, text: str) -> None:
@@ -58,7 +58,7 @@ class Page:
         self._add("heading", text=text, number=len(self._sections))
 
     def say(self, text: str, *, stamp: bool = False) -> None:
-        """Add a paragraph; a stamp is one that nobody may miss."""
+        """Add a paragraph; a stamp is a highlighted one."""
         self._add("paragraph", text=text, stamp=stamp)
 
     def links(self, targets: Mapping[str, str]) -> None:
@@ -78,7 +78,7 @@ class Page:
         )
 
     def text(self, name: str, text: str) -> None:
-        """Write a text beside the page, with the footer in its first line, and link to it."""
+        """Write a text into the page's folder, the footer in its first line, and link to it."""
         said = f"{self._footer}.\n\n" if self._footer else ""
         (self._root / name).write_text(said + text, encoding="utf-8")
         self.links({name: f"{self._up}{name}"})

@@ -33,18 +33,18 @@ if TYPE_CHECKING:
     import pandas as pd
 
 USUAL = ("movement_time", "absolute_error", "circle_to_circle")
-"""What is tested of every study that recorded it, beside the protocol's primary outcomes."""
+"""Measures tested in every study that recorded them, with the protocol's primary outcomes."""
 
 TO_REST = "onset_to_rest"
-"""Tested too where a movement ends otherwise than by rest, and so is not the movement time."""
+"""Tested too if movements do not end by rest, so that it differs from movement time."""
 
 ADJUSTED = f" with {TAKEN}"
-"""Behind the name of an effect of positions that was tested beside pairs of targets."""
+"""Suffix of an effect of positions that was adjusted for pairs of targets."""
 
 SEQUENCE = "sequence"
 
 Confusable = tuple[tuple[str, tuple[str, ...]], ...]
-"""What an effect may not be told from: each in words, and its columns."""
+"""Possible confounds of an effect: each in words, with its columns."""
 
 PAIRS = "pairs of targets"
 ORDER: Confusable = (("the order in which conditions came", (PHASE,)),)
@@ -57,27 +57,27 @@ BESIDE_PHASES: Confusable = (
     ("the targets' distance", (DISTANCE,)),
     ("the targets' width", ("width",)),
 )
-"""What may change from one session or block to the next in everybody, beside what is learnt."""
+"""What may change between sessions or blocks for all participants, in addition to learning."""
 
 OF_PHASES = {PHASE, SESSION, BLOCK, CONDITION}
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A planned analysis of variance, and which of its effects are asked for.
+    """A planned analysis of variance, and its requested effects.
 
     Attributes
     ----------
     within
         Columns of the factors within participants.
     asked
-        Columns that an effect has to be of, all of them; without any, every effect is asked for.
+        Columns that a requested effect must include; without any, every effect is requested.
     beside
-        What pairs are told by, where the effect is tested beside them; otherwise empty.
+        Column that identifies pairs, where the effect is adjusted for them; otherwise empty.
     phase
-        The only one whose movements are in it; empty for all.
+        The only phase whose movements are in it; empty for all.
     confusable
-        What the effect may not be told from.
+        Possible confounds of the effects.
     """
 
     within: tuple[str, ...]
@@ -88,11 +88,11 @@ class Plan:
 
     @property
     def suffix(self) -> str:
-        """What stands behind an effect's name: where and of what it is."""
+        """Suffix of an effect's name: its phase and adjustment."""
         return f" in {self.phase}" * bool(self.phase) + ADJUSTED * bool(self.beside)
 
     def of(self, results: "pd.DataFrame") -> "pd.DataFrame":
-        """Return the movements that are in it."""
+        """Return its movements."""
         if CONDITION in self.within:  # blocks beside them are of none
             results = results[results[CONDITION].fillna("") != ""]
         return results[results[PHASE] == self.phase] if self.phase else results
@@ -104,14 +104,14 @@ class Plan:
         people: Collection[str],
         effect: Sequence[str] = (),
     ) -> str:
-        """Return what an effect cannot be told from in those who are in its test; empty if none.
+        """Return the confounds of an effect in those who are in its test; empty if none.
 
         Parameters
         ----------
         people
-            Who is in the test: others may have come in orders that would tell it apart.
+            Who is in the test: the orders of others could remove the confound.
         effect
-            Its columns; those that are asked for by default.
+            Its columns; by default the requested ones.
         """
         known = self.of(results).dropna(subset=[measure])
         known = known[known["participant"].isin(people)]
@@ -134,13 +134,13 @@ CONDITIONS = Plan((CONDITION,), (CONDITION,), confusable=ORDER)
 
 
 def measures_in(results: "pd.DataFrame", primary: Sequence[str] = ()) -> list[str]:
-    """Return the outcomes that there are, the primary ones first."""
+    """Return the recorded outcomes, the primary ones first."""
     names = dict.fromkeys([*primary, *USUAL, *([TO_REST] if rests_apart(results) else [])])
     return [name for name in names if name in results and results[name].notna().any()]
 
 
 def rests_apart(results: "pd.DataFrame") -> bool:
-    """Return whether movements end otherwise than by rest, so that rest has a time of its own."""
+    """Return whether movements do not end by rest, so that rest has a time of its own."""
     if not {TO_REST, "movement_time"} <= set(results):
         return False
     apart = results["movement_time"].notna() & (results[TO_REST] != results["movement_time"])
@@ -181,7 +181,7 @@ def named_factor(name: str, factors: Factors) -> str:
 
 
 def plans(results: "pd.DataFrame", factors: Factors) -> Iterator[Plan]:
-    """Yield what is planned of every outcome."""
+    """Yield the plans of every outcome."""
     phases = tuple(factors.over_phases)
     pair = pair_of(results)
     # First, because most participants are whole there.
@@ -203,12 +203,12 @@ def plans(results: "pd.DataFrame", factors: Factors) -> Iterator[Plan]:
 
 
 def pair_of(results: "pd.DataFrame") -> str:
-    """Return the column that tells pairs of targets apart; empty where there is none."""
+    """Return the column that identifies pairs of targets; empty if there is none."""
     return next((name for name in ("pair", DISTANCE) if name in results), "")
 
 
 def tests(results: "pd.DataFrame", measure: str, factors: Factors) -> Iterator[Anova]:
-    """Yield the tests; what stands behind an effect's name says where and of what it is."""
+    """Yield the tests; the suffix of an effect's name states its phase and adjustment."""
     for plan in plans(results, factors):
         yield from tests_of(plan, results, measure, factors)
 
@@ -225,7 +225,7 @@ def tests_of(
 def practice_table(
     everything: "pd.DataFrame", factors: Factors, primary: Sequence[str] = ()
 ) -> "pd.DataFrame":
-    """Return the tests of practice against what counts; empty where there was none."""
+    """Return the tests of practice against counted movements; empty without practice."""
     import pandas as pd
 
     if not factors.practice:
@@ -240,7 +240,7 @@ def practice_table(
 
 
 def practised(everything: "pd.DataFrame") -> "pd.DataFrame":
-    """Return what succeeded and was shown, in practice too, with that as a factor."""
+    """Return successful, shown movements including practice, with practice as a factor."""
     done = everything[is_done(everything) & ~not_presented(everything)].copy()
     return done.assign(practice=practice_words(done))
 
@@ -282,7 +282,7 @@ def contrast_table(
 
 
 def _of_phases(results: "pd.DataFrame", one: Contrast, name: str) -> str:
-    """Return what the difference of two sessions or blocks cannot be told from; empty if none."""
+    """Return the confounds of a difference of two sessions or blocks; empty if none."""
     two = results[results[name].isin([one.first, one.second])]
     return Plan((), (name,), confusable=BESIDE_PHASES).confounded(two, one.measure, one.people)
 
@@ -292,7 +292,7 @@ def trend_table(
 ) -> "pd.DataFrame":
     """Return the linear trends over positions in each phase; of primary outcomes, all share Holm.
 
-    Where none is said to be primary, every outcome is one.
+    If none is named as primary, every outcome is.
     """
     import pandas as pd
 
@@ -323,7 +323,7 @@ def trend_table(
 def trend_confounded(
     results: "pd.DataFrame", measure: str, phase: str, people: Collection[str]
 ) -> str:
-    """Return what positions of a phase cannot be told from in some people; empty where they can."""
+    """Return the confounds of a phase's positions in some people; empty if none."""
     pair = pair_of(results)
     plan = Plan((PLACE,), (PLACE,), phase=phase, confusable=((PAIRS, (pair,)),) if pair else ())
     return plan.confounded(results, measure, people)
@@ -355,7 +355,7 @@ def time_scale_tables(
 def _between_phases(
     results: "pd.DataFrame", rows: "pd.DataFrame", found: "pd.DataFrame", factors: Factors
 ) -> list[str]:
-    """Return for each row what a change from the phase before cannot be told from."""
+    """Return for each row the confounds of a change from the phase before."""
     words = []
     for row in rows.to_dict("records"):
         at = factors.phases.index(str(row["phase"]))
@@ -374,7 +374,7 @@ def _between_phases(
 def score_table(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
     """Return means and spreads of every score, by group and occasion.
 
-    Those of whoever has a value on every occasion, who are tested, stand beside those of all.
+    Values of the tested participants, who have one on every occasion, are next to those of all.
     """
     import pandas as pd
 
@@ -416,7 +416,7 @@ def score_tests(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame
 
 
 def _of_occasions(table: "pd.DataFrame", test: Anova, factor: str, other: str, words: str) -> str:
-    """Return what a score's factor cannot be told from in those who are in its test."""
+    """Return the confounds of a score's factor in those who are in its test."""
     if test.factor != factor or other not in table or (table[other] == "").all():
         return ""
     known = table.dropna(subset=[test.measure])
@@ -482,7 +482,7 @@ def occasions(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
 
 
 GAZE_VALID = ("gaze_valid_before", "gaze_valid_during")
-"""Columns of the shares of a time in which it is known where somebody looked."""
+"""Columns of the shares of time in which the gaze position is known."""
 
 HALF = 0.5
 """Share of the time below which the report warns of dwell: what is not known counts as no look."""
@@ -497,7 +497,7 @@ def little_gaze(results: "pd.DataFrame") -> int:
 def gaze_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
     """Return means over participants' means of how long areas were looked at, and of how many.
 
-    Beside them, in which share of the time it is known where somebody looked.
+    With the share of the time in which the gaze position is known.
     """
     import pandas as pd
 
@@ -523,7 +523,7 @@ def gaze_tests(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
 
 
 def of_gaze(results: "pd.DataFrame") -> list[str]:
-    """Return the columns of gaze of which there is something to say."""
+    """Return the columns of gaze with values."""
     names = [str(name) for name in results if str(name).startswith(("dwell_", "look_lead_"))]
     return [name for name in names if results[name].notna().any()]
 
@@ -536,7 +536,7 @@ def _frame(tests: Sequence[Anova], people: Mapping[str, str]) -> "pd.DataFrame":
 
 
 def _row(result: Anova | Contrast | Trend, people: Mapping[str, str]) -> dict[str, Any]:
-    """Return a result as a row of a table, with who of the sample is not in it."""
+    """Return a result as a row of a table, with the participants who are not in it."""
     row: dict[str, Any] = asdict(result)
     tested = set(row.pop("people"))
     return row | {"left_out": " ".join(name for name in people if name not in tested)}

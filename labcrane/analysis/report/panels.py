@@ -1,4 +1,4 @@
-"""Panels of a figure: axes with lines and dots, told as numbers, and drawn in two ways.
+"""Panels of a figure: axes with lines and dots as numbers, with two renderers.
 
 Matplotlib draws what a study publishes. It takes a second of the processor for the figures of one
 participant, which is most of what a report of a large study would take; their pages are drawn as
@@ -46,13 +46,13 @@ class Series:
     x, y
         Shape ``(n,)``; what is NaN is left out.
     colour
-        As HTML has it.
+        An HTML colour.
     kind
         Whether they are joined by a line, dots, or both.
     label
         In the legend; empty for none.
     reach
-        How far each may be off downwards and upwards, shape ``(2, n)``; None for no bars.
+        Uncertainty of each downwards and upwards, shape ``(2, n)``; None for no bars.
     """
 
     x: FloatArray
@@ -65,16 +65,16 @@ class Series:
 
 @dataclass(frozen=True)
 class Panel:
-    """Axes with what is drawn in them.
+    """Axes with their series.
 
     Attributes
     ----------
     across, up
-        What the axes are, with their units.
+        Names of the axes, with their units.
     legend
-        What the labels of the series are.
+        Heading of the series' labels.
     keep
-        What the upright axis keeps to where Matplotlib draws it; None for all that there is.
+        Range of the vertical axis in Matplotlib; None for all values.
     """
 
     across: str

@@ -1,7 +1,7 @@
-"""Protocols of a cohort: where its sessions were not run by the same one.
+"""Protocols of a cohort: differences between those of its sessions.
 
-A study is amended, or a file is changed between two participants. What they did then differs, and
-whoever averages over them has to know where.
+A study is amended, or a file is changed between two participants. Their sessions then differ, and
+readers of averages need to know where.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 COLUMNS = ("place", "value", "n", "sessions")
 
 ASIDE = ("title", "participants", "expected", "page", "operator")
-"""Keys of a protocol that change nothing of what a participant does."""
+"""Keys of a protocol that do not affect participants."""
 
 ABSENT = "(nothing)"
 
@@ -25,7 +25,7 @@ Leaves = dict[str, str]
 
 
 def unlike_protocols(cohort: Cohort) -> "pd.DataFrame":
-    """Return where the included sessions have another protocol, machine or file than others.
+    """Return the differences of protocol, machine or files between the included sessions.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def _digest(context: Mapping[str, Any]) -> str:
 
 
 def _leaves_of(context: Mapping[str, Any]) -> Leaves:
-    """Return everything of a session that may differ from another's, by where it is written."""
+    """Return all values of a session that may differ from another's, by their place."""
     protocol = parse_yaml(str(context.get("protocol", "")), "the recorded protocol", recorded=True)
     written = protocol if isinstance(protocol, Mapping) else {}
     found = dict(_leaves("", {key: each for key, each in written.items() if key not in ASIDE}))

@@ -69,21 +69,21 @@ def write_report(
 ) -> Path:
     """Write the report of a cohort into ``folder``; return the page to open.
 
-    Each worker reads one participant after the other; of each only movements and qualities are
-    kept.
+    Each worker reads one participant after the other; only movements and qualities are kept.
 
     Parameters
     ----------
     progress
-        Told how many participants are done, of how many.
+        Called with the number of completed participants, and of all.
     leave_out
-        Told whose data cannot be used, and why; the report is of the others, and says so.
+        Called with a participant whose data cannot be used, and the reason; the report is of the
+        others, and states so.
     workers, scheduler
-        Who does it; see :func:`labcrane.analysis.parallel.work`.
+        The workers; see :func:`labcrane.analysis.parallel.work`.
     unprobed
-        Streams whose clock was never probed, which are used all the same, in words.
+        Streams whose clock offset was never measured but which are used, in words.
     judge
-        Says how well a recorded track finds thresholds; without it nobody says so.
+        Returns how well a recorded track finds thresholds; by default it is not reported.
     """
     import pandas as pd
 
@@ -125,9 +125,7 @@ def write_report(
     page.table("loop_quality", quality[0])
     _syncs(page, quality[1])
     if unprobed:
-        page.say(
-            f"Used as told, though nobody knows how right their times are: {'; '.join(unprobed)}."
-        )
+        page.say(f"Used on request, though timestamp accuracy is unknown: {'; '.join(unprobed)}.")
     page.lead(answer(cohort, everything, quality, about, results))
     page.heading("Definitions")
     page.say(f"Settings of the measures: {settings.as_dict()}")
@@ -155,8 +153,8 @@ def _one(
     """Write one participant's page; return name and tables.
 
     These are movements, quality of loop and of clocks, answers, scores, thresholds, drifts of gaze
-    and gaze that is not measured. The second of what is returned is why the data cannot be
-    used, and then the tables are empty.
+    and gaze that is not measured. The second result is the reason why the data cannot be
+    used; then the tables are empty.
     """
     import pandas as pd
 
@@ -180,13 +178,13 @@ def _words(error: Exception) -> str:
 
 
 def _primary(cohort: Cohort) -> list[str]:
-    """Return what any of the recordings calls a primary outcome, in that order."""
+    """Return the primary outcomes of all recordings, in their order."""
     named = [person.context.get("primary", ()) for person in cohort.included]
     return list(dict.fromkeys(str(name) for names in named for name in names))
 
 
 def _title(participants: Sequence[Participant]) -> str:
-    """Return the study's title, behind what kind of participants it is about."""
+    """Return the study's title, after the kind of participants."""
     title = str(participants[0].context.get("title", "labcrane"))
     kinds = kinds_of(participants)
     return f"{kinds}: {title}" if kinds else title
@@ -208,17 +206,17 @@ def _who(page: Page, cohort: Cohort, everything: "pd.DataFrame") -> None:
     page.heading("Participants and exclusions")
     page.say(
         "Complete participants are included; simulated, pilot and half-finished ones only when "
-        "asked for; erased, excluded and unreadable ones never."
+        "requested; erased, excluded and unreadable ones never."
     )
     page.table("participants", cohort.listing())
     out = exclusions(everything)
-    page.say(f"{len(out)} of {len(everything)} movements count for no average.")
+    page.say(f"{len(out)} of {len(everything)} movements are excluded from means.")
     page.table("excluded_movements", out)
     still = everything[without_onset(everything)]
     if len(still):
         page.say(
             f"In {listed(still)} the movement has no onset: it was over before anything moved. "
-            "Their errors say where the machine stood; they count for no accuracy and no time."
+            "Their errors say where the machine was; accuracy and time measures exclude them."
         )
         page.table(
             "without_onset",
@@ -229,7 +227,7 @@ def _who(page: Page, cohort: Cohort, everything: "pd.DataFrame") -> None:
 
 
 def _sample(page: Page, cohort: Cohort, answers: "pd.DataFrame", groups: dict[str, str]) -> str:
-    """Add who took part and by which protocols, and return it in words."""
+    """Add the participants and their protocols, and return them in words."""
     unlike = unlike_protocols(cohort)
     page.say(protocols_in_words(unlike))
     if len(unlike):
@@ -250,7 +248,7 @@ def _study(
     primary: Sequence[str],
     units: Mapping[str, str],
 ) -> Results:
-    """Add what is only known of all together, and return what was found."""
+    """Add the results for the whole cohort, and return them."""
     everything = with_factors(everything)
     factors = factors_of(everything, groups)
     results = everything[is_result(everything)]
@@ -259,7 +257,7 @@ def _study(
     page.heading("Time-outs")
     page.say(
         "Times from the trial's start. A mean of successes alone makes a hard condition look fast; "
-        "in the median (Kaplan and Meier) a time-out takes longer than it was allowed to."
+        "in the median (Kaplan and Meier) time-outs are censored at the time limit."
     )
     page.table("time_outs", counts)
     _movements(page, results, factors, measures_in(results, primary))
@@ -273,7 +271,7 @@ def _study(
         page.heading("Questionnaires")
         page.table("scores", outcomes.score_table(scores, groups))
         if len(by_condition := outcomes.condition_scores(scores, groups)):
-            page.say("By condition, of those who answered after each of them:")
+            page.say("By condition, for participants who answered after each of them:")
             page.table("scores_by_condition", by_condition)
         page.table("score_tests", tests)
     made = Made(anovas, trends, scales, practice, looked, tests)
@@ -281,12 +279,12 @@ def _study(
     page.heading("What was not tested")
     if len(short):
         page.say(
-            "Planned tests that could not be made, or not of everybody and every level: a test is "
-            "of those with a value in each of its cells."
+            "Planned tests that were not possible, or not with all participants and levels: a test "
+            "includes participants with a value in each of its cells."
         )
         page.table("shortfalls", short)
     else:
-        page.say("Every planned test was made, of everybody and every level.")
+        page.say("Every planned test was made with all participants and levels.")
     found = Results(
         about,
         anovas,
@@ -337,7 +335,9 @@ def _movements(
     curves = pd.concat([learning_curves(in_phase, measure) for measure in measures])
     if len(curves):
         unknown = int((curves["identified"] == "no").sum())
-        page.say(f"In {unknown} of {len(curves)} fits the asymptote cannot be told from the data.")
+        page.say(
+            f"In {unknown} of {len(curves)} fits the asymptote cannot be determined from the data."
+        )
         for measure in measures:
             page.draw(figures.learning(results, curves, measure))
     page.heading("Fitts' law and throughput")
@@ -348,19 +348,19 @@ def _movements(
 
 
 def _rests(results: "pd.DataFrame") -> str:
-    """Return of how many movements there is no time from onset to rest, and why."""
+    """Return the number of movements without a time from onset to rest, and the reasons."""
     missing = results[results[outcomes.TO_REST].isna() & results["movement_time"].notna()]
     moving = int((missing["at_rest"] == 0.0).sum())
     said = (
-        "The time from onset to rest ends with the beginning of the rest in which the movement was "
-        "ended; movement time goes on to its end."
+        "The time from onset to rest ends when the final rest of the movement begins; movement "
+        "time includes that rest."
     )
     if not len(missing):
         return f"{said} Every movement has it."
     return (
         f"{said} {len(missing)} of {len(results)} movements have none: in {moving} the tip still "
-        f"moved when they were ended, in {len(missing) - moving} it had not rested for as long as "
-        "a rest is."
+        f"moved when they were ended, in {len(missing) - moving} it had not rested long "
+        "enough."
     )
 
 
@@ -377,8 +377,8 @@ def _statistics(
     varies += [outcomes.named_factor(name, factors) for name in factors.over_phases]
     page.say(
         f"Within participants: {', '.join([*varies, outcomes.SEQUENCE, *factors.targets])}. Groups "
-        f"between participants: {', '.join(factors.groups) or 'none'}. A sequence begins anew with "
-        "each session or block."
+        f"between participants: {', '.join(factors.groups) or 'none'}. A sequence starts "
+        "again with each session or block."
     )
     if factors.unbalanced:
         page.say(f"{UNBALANCED}.")
@@ -393,19 +393,19 @@ def _statistics(
     else:
         page.say(
             "Analysis of variance over participants' means (type III); p_gg is corrected after "
-            "Greenhouse and Geisser. It says that some levels differ, not in which direction."
+            "Greenhouse and Geisser. It shows that some levels differ, not in which direction."
         )
         if anovas["factor"].str.contains(outcomes.ADJUSTED, regex=False).any():
             page.say(
-                "Pairs of targets come in several orders: with pairs' means taken away, a position "
-                "is compared with what its pair takes on average, which is estimated too and costs "
-                "degrees of freedom."
+                "Pairs of targets come in several orders: adjusted for pairs' means, a position "
+                "is compared with its pair's average, which is estimated too and costs degrees of "
+                "freedom."
             )
         for note in confounding(anovas):
             page.say(note)
         page.table("anova", anovas)
     if len(contrasts):
-        page.say("Differences two by two; p_holm is corrected within a factor, at one level.")
+        page.say("Pairwise differences; p_holm is corrected within a factor, at one level.")
         page.table("contrasts", contrasts)
     if len(trends):
         page.say(
@@ -414,8 +414,8 @@ def _statistics(
         page.table("trends", trends)
     page.say(
         "Two time scales: within a session or block, and from one to the next. Where adjustment "
-        f"says {TAKEN}, a slope is not quite that of the trends above; whoever lacks a first or "
-        "last position or a session is left out of what goes by it. "
+        f"says {TAKEN}, a slope differs slightly from that of the trends above; participants "
+        "without a first or last position or a session are left out of what needs it. "
         + "; ".join(f"{name}: {words}" for name, words in QUANTITIES.items())
         + "."
     )
@@ -424,7 +424,7 @@ def _statistics(
         page.table("time_scales_by_group", scales_by_group)
     practice = outcomes.practice_table(everything, factors, primary)
     if len(practice):
-        page.say("Practice against what counts.")
+        page.say("Practice compared with counted movements.")
         page.table("practice", practice)
     for measure in measures:
         _mixed(page, results.assign(sequence=results[PLACE]), measure)
@@ -432,31 +432,31 @@ def _statistics(
 
 
 def _of_primary(primary: Sequence[str], measures: Sequence[str]) -> str:
-    """Return in words which outcomes are primary, and which of them were not recorded."""
+    """Return a sentence on the primary outcomes, and on those that were not recorded."""
     if not primary:
-        return f"The protocol names no primary outcomes: {', '.join(measures)} count as such."
+        return f"The protocol names no primary outcomes: {', '.join(measures)} are used as such."
     said = f"Primary outcomes, as the protocol names them: {', '.join(primary)}."
     missing = [name for name in primary if name not in measures]
     return f"{said} Without a value in any movement: {', '.join(missing)}." if missing else said
 
 
 def _gaze(page: Page, results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
-    """Add how long areas were looked at; return the tests of it."""
+    """Add dwell times; return their tests."""
     looked = outcomes.gaze_table(results, factors)
     tests = outcomes.gaze_tests(results, factors)
     if len(looked):
         page.heading("Gaze")
         page.say(
-            "How long areas were looked at, before onset and during movements, and how long before "
-            "onset first, in seconds. Tests are of one area each, without a correction for their "
-            "number. gaze_valid is the share of the time in which it is known where somebody "
-            "looked; the rest counts as no look."
+            "Dwell times of areas, before onset and during movements, and the time from the first "
+            "look to onset, in seconds. Tests are of one area each, without a correction for their "
+            "number. gaze_valid is the share of the time in which the gaze position is known; "
+            "the rest is counted as not looking."
         )
         if little := outcomes.little_gaze(results):
             page.say(
-                f"In {little} of {len(results)} movements it is known for less than half of the "
-                "time before onset, or of the movement, where somebody looked: how long areas were "
-                "looked at is too little there, or missing."
+                f"In {little} of {len(results)} movements the gaze position is known for less than "
+                "half of the time before onset, or of the movement: dwell times are too short "
+                "there, or missing."
             )
         page.table("gaze", looked)
         if len(tests):
@@ -465,13 +465,13 @@ def _gaze(page: Page, results: "pd.DataFrame", factors: Factors) -> "pd.DataFram
 
 
 def _drifts(page: Page, looked: "pd.DataFrame") -> None:
-    """Add how far gaze was from the points at which the eye tracker was checked."""
+    """Add the distances of gaze from the fixation points of the eye tracker's checks."""
     if not len(looked):
         return
     page.heading("Drift of gaze")
     page.say(
-        "How far gaze was from points that were to be looked at, in each check of the eye tracker: "
-        "medians of the points' offsets and of their precision, and the worst point."
+        "Distance of gaze from the fixation points, in each check of the eye tracker: medians of "
+        "the points' offsets and of their precision, and the worst point."
     )
     by = looked.groupby(["participant", "session", "step"], as_index=False)
     page.table(
@@ -491,11 +491,11 @@ def _drifts(page: Page, looked: "pd.DataFrame") -> None:
 
 
 def _unmeasured(page: Page, streams: "pd.DataFrame") -> None:
-    """Add the gaze that was recorded, and by which nothing is measured."""
+    """Add the recorded gaze streams that are not measured."""
     if not len(streams):
         return
     page.heading("Gaze that is not measured")
-    page.say("These streams were recorded whole, and no measure is of them:")
+    page.say("These streams were recorded completely, but no measure uses them:")
     page.table("unmeasured_gaze", streams)
 
 
@@ -510,7 +510,7 @@ def _mixed(page: Page, results: "pd.DataFrame", measure: str) -> None:
 
 
 def _of_model(model: MixedModel) -> Iterator[str]:
-    """Yield in sentences what was modelled, and what of it could not be."""
+    """Yield sentences on the model, and on what could not be modelled."""
     modelled = f"the logarithm of {model.measure}" if model.log else model.measure
     without = f" ({model.missing} more have no value)" if model.missing else ""
     slopes = not math.isnan(model.slope_sd)
@@ -522,7 +522,7 @@ def _of_model(model: MixedModel) -> Iterator[str]:
         f"{model.residual_sd:.3g}; degrees of freedom after Satterthwaite."
     )
     if model.measure in TIMES and not model.log:
-        yield "It is modelled as it is, since a value of 0 or less has no logarithm."
+        yield "It is modelled untransformed, since a value of 0 or less has no logarithm."
     if model.boundary:
         yield (
             "The fit is at a boundary (singular): intercepts and slopes of participants do not "
@@ -534,18 +534,18 @@ def _of_model(model: MixedModel) -> Iterator[str]:
             "group are differences from it."
         )
     for name in model.dropped:
-        yield f"{name} is not in it: it cannot be told from the other terms here."
+        yield f"{name} is not in the model: it cannot be distinguished from the other terms."
 
 
 def _syncs(page: Page, syncs: "pd.DataFrame") -> None:
     if syncs.empty:
-        page.say("No streams of others were recorded: there is one clock.")
+        page.say("No external streams were recorded: there is one clock.")
     else:
         page.table("sync_quality", syncs)
 
 
 def _by_which_rule(everything: "pd.DataFrame") -> str:
-    """Return what the movements' onset is, and how many recordings had it by another rule."""
+    """Return the definition of onset, and the number of recordings with another rule."""
     rule = (
         "A movement begins when the tip is first faster than onset_speed for onset_hold, columns "
         "of the movements, and its halts are part of it; reaction_time is that of the sticks."
@@ -556,16 +556,16 @@ def _by_which_rule(everything: "pd.DataFrame") -> str:
     return (
         f"{rule} {anew} of {len(everything)} movements were recorded by a former rule, from the "
         "onset of the fastest stroke, with reaction_time up to it: their reaction_time, "
-        "movement_onset, movement_time, onset_to_rest and path_length were measured anew, and are "
+        "movement_onset, movement_time, onset_to_rest and path_length were computed again, and are "
         "not those of the recording."
     )
 
 
 def _definitions(cohort: Cohort, everything: "pd.DataFrame") -> "pd.DataFrame":
-    """Return unit and meaning of the measures, and of what the sessions recorded of each trial."""
+    """Return unit and meaning of the measures, and of the recorded columns of trials."""
     import pandas as pd
 
-    units = dict.fromkeys(TIMES, "s")  # some are measured anew where none was recorded
+    units = dict.fromkeys(TIMES, "s")  # some are computed where none was recorded
     recorded: dict[str, str] = {}
     for person in cohort.included:
         units |= person.context.get("trial_units", {})
@@ -613,7 +613,7 @@ def _participant_page(
     page.table("excluded_movements", exclusions(own))
     if len(marks := annotations_of(participant)):
         page.heading("Marks")
-        page.say("What people marked in the recordings afterwards; times are from the first frame.")
+        page.say("Annotations made in the viewer; times are from the first frame.")
         page.table("annotations", marks.drop(columns=["participant", "time", "until"]))
     page.heading("Loop and clocks")
     page.table("loop_quality", loop)

@@ -13,9 +13,9 @@ AGE, GENDERS, HANDS, EXPERIENCE = "age", ("gender", "sex"), "handedness", "exper
 
 
 def sample(answers: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
-    """Return one row for everybody and one per group, from the answers to demographics.
+    """Return one row for all and one per group, from the answers to demographics.
 
-    A question that nobody was asked has no column; who declined is counted in none.
+    An item that was never presented has no column; declined answers are not counted.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def _counts(words: Sequence[str]) -> str:
 
 
 def in_words(table: "pd.DataFrame") -> str:
-    """Return the sample in a sentence; it says of how many an answer is known."""
+    """Return the sample in a sentence, with the number of known answers."""
     row = table.iloc[0].to_dict()
     parts = [f"{row['n']} participant{'' if row['n'] == 1 else 's'}"]
     about = []

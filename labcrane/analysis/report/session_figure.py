@@ -1,4 +1,4 @@
-"""A picture of a session's movements: where the tip went, how fast, and what it took."""
+"""A picture of a session's movements: the tip's path and speed, and the times."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,10 +30,10 @@ def draw(session: "SessionRecord", path: Path) -> None:
 
 
 def names(trials: "pd.DataFrame") -> list[str]:
-    """Return what people call the trials of a table, a row each: ``3``, or ``practice 1``.
+    """Return the names of a table's trials, a row each: ``3``, or ``practice 1``.
 
-    The record also numbers the ways to trials; what people read counts the trials alone, and one
-    that was repeated keeps its number.
+    The record also numbers approach movements; names count the trials alone, and a repeated trial
+    keeps its number.
     """
     found = []
     for number, practice in zip(trials["trial"], trials["practice"], strict=True):

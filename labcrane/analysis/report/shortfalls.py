@@ -1,4 +1,4 @@
-"""Shortfalls of planned tests: what could not be tested, or not of everybody, and why."""
+"""Shortfalls of planned tests: what could not be tested, or not with all participants, and why."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -29,28 +29,28 @@ if TYPE_CHECKING:
 NOTHING = "nothing recorded"
 
 NAMED = 12
-"""Participants who are named in a sentence; tables have them all."""
+"""Participants who are named in a sentence; tables list all."""
 
 SHOWN = 3
-"""Cells without a value that are named; of more their number is told."""
+"""Cells without a value that are named; the others are only counted."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shortfall:
-    """What a planned test lacks.
+    """The shortfall of a planned test.
 
     Attributes
     ----------
     measure, factor
-        What was to be tested, over what, as the tables of tests name it.
+        The measure and the factor, as in the tables of tests.
     without
-        The group, level or people that the test had to do without; empty where there is no test.
+        The group, level or people missing from the test; empty if there is no test.
     people
-        Of the sample, or of the group it had to do without.
+        Number in the sample, or in the missing group.
     whole
-        Those of them with a value in every cell.
+        Number of them with a value in every cell.
     why
-        The same in words.
+        The reason in words.
     """
 
     measure: str
@@ -63,12 +63,12 @@ class Shortfall:
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """Tests that were made, as the report's tables have them.
+    """Tests that were made, from the report's tables.
 
     Attributes
     ----------
     anova, trends, scales, practice, gaze, scores
-        Empty ones where none was.
+        Empty if there was none.
     """
 
     anova: "pd.DataFrame"
@@ -86,7 +86,7 @@ def shortfalls(
     factors: Factors,
     primary: Sequence[str] = (),
 ) -> "pd.DataFrame":
-    """Return what planned tests lack; empty where all were made, of everybody and every level.
+    """Return the shortfalls; empty if all tests were made with all participants and levels.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def shortfalls(
     made
         The tests that were made.
     factors
-        What varies, and who is in the sample.
+        The factors, and the sample.
     """
     import pandas as pd
 
@@ -180,15 +180,15 @@ def _of_plan(
     effects = [plan.asked] if plan.asked else [(name,) for name in (*plan.within, GROUP)]
     for effect in effects:
         if not set(effect) <= set(levels):
-            continue  # it was not to vary
+            continue  # it was not planned to vary
         plain = ":".join(effect) + plan.suffix
         name, before = (named_factor(each, factors) for each in (plain, _before(plain)))
         if not plan.beside or name in made:
             yield from design.lacking(effect, name, tested=name in made)
         elif before in made:
             apart = plan.confounded(results, measure, design.whole)
-            few = "so few people leave nothing to tell how they differ"
-            why = f"positions cannot be told from {apart}" if apart else few
+            few = "there are too few people to estimate their variance"
+            why = f"positions cannot be distinguished from {apart}" if apart else few
             yield Shortfall(measure, name, "", len(people), len(design.whole), why)
 
 
@@ -197,7 +197,7 @@ def _before(name: str) -> str:
 
 
 class _Design:
-    """Cells of a planned test: who has all of them, and what is missing."""
+    """Cells of a planned test: who has all of them, and the missing ones."""
 
     def __init__(
         self,
@@ -224,14 +224,17 @@ class _Design:
         self._cells = f" in every cell of {' and '.join(varied)}" if varied else ""
 
     def lacking(self, effect: tuple[str, ...], name: str, *, tested: bool) -> Iterator[Shortfall]:
-        """Yield what the test of one effect lacks."""
+        """Yield the shortfalls of the test of one effect."""
         if not tested:
             why = self._why(effect)
             yield Shortfall(self.measure, name, "", len(self.people), len(self.whole), why)
             return
         for factor in effect:
             for level in self._gone(factor):
-                without, why = f"{self._word(factor)} {word(level)}", "nobody has a value there"
+                without, why = (
+                    f"{self._word(factor)} {word(level)}",
+                    "no participant has a value there",
+                )
                 yield Shortfall(self.measure, name, without, len(self.people), 0, why)
         for group in self.levels.get(GROUP, ()):
             members = [who for who, own in self.people.items() if own == group]
@@ -242,7 +245,7 @@ class _Design:
         yield from self.missing(name)
 
     def missing(self, name: str) -> Iterator[Shortfall]:
-        """Yield who is not in the test, and what they lack of its cells."""
+        """Yield who is not in the test, and their missing cells."""
         varied = {factor: own for factor, own in self._there.items() if len(own) > 1}
         cells = set(product(*varied.values()))
         why: dict[str, list[str]] = {}
@@ -269,7 +272,7 @@ class _Design:
     def _where(
         self, lacks: set[tuple[Any, ...]], cells: set[tuple[Any, ...]], names: list[str]
     ) -> str:
-        """Return which cells these are: all with some levels of one factor, or one by one."""
+        """Return a description of cells: all with some levels of one factor, or one by one."""
         if lacks == cells:
             return ""
         for at, name in enumerate(names):
@@ -297,7 +300,7 @@ class _Design:
         for factor in effect:
             if len(self._there.get(factor, "ab")) < 2:  # noqa: PLR2004 - two can be compared
                 gone = ", ".join(map(word, self._gone(factor)))
-                return f"nobody has a value at {self._word(factor)} {gone}"
+                return f"no participant has a value at {self._word(factor)} {gone}"
         if whole < LEAST:
             have = f"{whole} of {len(self.people)} people have a value{self._cells}"
             return f"{have}, and {LEAST} are needed{self._nobody()}"
@@ -306,22 +309,22 @@ class _Design:
         if GROUP in self.levels and whole <= len(groups):
             return (
                 f"{whole} people with a value{self._cells} are in {len(groups)} groups, "
-                "which leaves nothing to tell how people differ"
+                "too few to estimate the variance between people"
             )
-        return f"the {whole} people with a value{self._cells} do not differ in what is tested"
+        return f"the {whole} people with a value{self._cells} do not differ in the tested values"
 
     def _nobody(self) -> str:
         said = [", ".join(map(word, cell)) for cell in self._empty]
         if not said:
             return ""
         more = f" and {len(said) - SHOWN} more" if len(said) > SHOWN else ""
-        return f"; nobody has one at {'; '.join(said[:SHOWN])}{more}"
+        return f"; no participant has one at {'; '.join(said[:SHOWN])}{more}"
 
 
 def left_out(
     measure: str, name: str, why: Mapping[str, list[str]], people: int
 ) -> Iterator[Shortfall]:
-    """Yield who is not in a test, from people by their reason; nothing where all are in it."""
+    """Yield who is not in a test, from people by their reason; empty if all are in it."""
     gone = [who for own in why.values() for who in own]
     if not gone:
         return
@@ -341,7 +344,7 @@ def people_in_words(names: Sequence[str]) -> str:
 
 
 def _cells_of(table: "pd.DataFrame", who: str, names: list[str]) -> set[tuple[Any, ...]]:
-    """Return the cells in which a participant has rows; the only one where nothing varies."""
+    """Return the cells in which a participant has rows; the only one if there are no factors."""
     own = table[table["participant"] == who]
     if not names:
         return {()} if len(own) else set()
@@ -388,7 +391,7 @@ def _of_trends(
 def _of_scales(
     everything: "pd.DataFrame", measure: str, factors: Factors, scales: "pd.DataFrame"
 ) -> Iterator[Shortfall]:
-    """Yield who lacks a quantity of the time scales; what has no test says so in its own row."""
+    """Yield who lacks a quantity of the time scales; others have a row of their own."""
     recorded = _counted(everything)
     for row in scales[scales["measure"] == measure].to_dict("records") if len(scales) else ():
         if row["why"] or row["group"] != "all":

@@ -1,4 +1,4 @@
-"""Style of every figure: sizes that journals print, readable letters, colours for everybody."""
+"""Style of every figure: sizes of journals, readable letters, colours for all viewers."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,10 +15,10 @@ COLUMN, PAGE = 85.0 * MM, 174.0 * MM
 HIGH = 65.0 * MM
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-"""Those of Okabe and Ito, which everybody can tell apart; their yellow is too faint on white."""
+"""Colours of Okabe and Ito, which all viewers can distinguish; their yellow is too faint."""
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-"""Beside the colours, for who prints without them."""
+"""In addition to colours, for printing without them."""
 
 DOTS_PER_INCH = 300
 

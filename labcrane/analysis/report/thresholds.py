@@ -1,4 +1,4 @@
-"""Thresholds that tracks found: everybody's, and how far such estimates are off."""
+"""Thresholds from tracks: those of participants, and the error of such estimates."""
 
 import json
 from collections.abc import Callable
@@ -12,20 +12,20 @@ if TYPE_CHECKING:
 
 ENDED = "track.end"
 LAW = "law"
-"""Column of what a recording says of a track, as JSON; not shown."""
+"""Column of a track's description in the recording, as JSON; not shown."""
 
 COLUMNS = (
     "participant", "session", "block", "track", "estimate", "sd", "responses", "ended", LAW,
 )  # fmt: skip
 
 Judge = Callable[[str, str], "pd.DataFrame"]
-"""Returns how well a track finds thresholds, from its name and what a recording says of it."""
+"""Returns how well a track finds thresholds, from its name and recorded description."""
 
 
 def thresholds_of(participant: Participant) -> "pd.DataFrame":
-    """Return a row for each block with a track: where the track stood at its end.
+    """Return a row for each block with a track: the track's state at its end.
 
-    A block that was gone on with, or run again, has the row of its last end.
+    A block that was continued or repeated has the row of its last end.
     """
     import pandas as pd
 
@@ -45,14 +45,14 @@ def thresholds_of(participant: Participant) -> "pd.DataFrame":
 
 
 def add_thresholds(page: Page, found: "pd.DataFrame", judge: Judge | None) -> None:
-    """Add what was found, and what is to be believed of it; nothing where there was no track."""
+    """Add the thresholds and their accuracy; nothing without a track."""
     import pandas as pd
 
     if not len(found):
         return
     page.heading("Thresholds")
     page.say(
-        "Where tracks stood at the end of their blocks, in the unit of their levels: the threshold "
+        "Results of tracks at the end of their blocks, in the unit of their levels: the threshold "
         "and its standard deviation by QUEST+, the mean of a staircase's levels at reversals and "
         "theirs. Empty where too little was known."
     )
@@ -64,9 +64,9 @@ def add_thresholds(page: Page, found: "pd.DataFrame", judge: Judge | None) -> No
     page.say(
         "How far such estimates are off: bias and spread are mean and standard deviation of "
         "estimate minus truth, of simulated operators whose thresholds are known, spread evenly "
-        "from the easiest to the hardest level; bias is also told of the tenth with the lowest "
-        "thresholds and of that with the highest, which are taken for ones further in. Success "
-        "falls with the level as QUEST+ believes; of a staircase, which believes nothing, as "
-        "steeply as the row says."
+        "from the easiest to the hardest level; bias is also given for the tenth with the "
+        "lowest thresholds and for that with the highest, which are estimated too far inward. "
+        "Success falls with the level as QUEST+ assumes; for a staircase, which assumes nothing, "
+        "as steeply as the row states."
     )
     page.table("track_quality", quality)

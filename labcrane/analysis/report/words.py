@@ -1,4 +1,4 @@
-"""Results in words, with their numbers, as HTML, Markdown and LaTeX want them."""
+"""Results in APA style, in HTML, Markdown and LaTeX."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LEVEL = 0.05
-"""Of significance, in the words only; p is always there."""
+"""Level of significance, in the words only; p is always given."""
 
 NAMES = {
     "movement_time": "Movement time, from onset to offset,",
@@ -33,7 +33,7 @@ SMALLEST = 0.001
 
 UNBALANCED = (
     "Sessions do not have the same blocks: each block of each session is a level of one factor, "
-    "phase, and no effect of session is told from one of block"
+    "phase, and effects of session and block cannot be separated"
 )
 
 
@@ -96,22 +96,22 @@ STYLES: Mapping[str, Style] = {
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """What is put into words.
+    """Results to put into words.
 
     Attributes
     ----------
     sample
         The sample in a sentence.
     anova, contrasts, trends, scales, gaze, scores
-        The report's tables; empty ones say nothing.
+        The report's tables; empty ones add no text.
     time_outs
         Counts by condition.
     factors
-        What varies.
+        Factors of the study.
     people
-        Participants of the sample; a test of others tells its own number.
+        Participants of the sample; a test of others gives its own number.
     shortfalls
-        What planned tests lack.
+        Shortfalls of planned tests.
     primary
         Outcomes that the protocol names as primary.
     units
@@ -150,7 +150,7 @@ def paragraphs(results: Results, style: Style) -> list[str]:
         effects = [row for table in tests[:3] for row in _of(table, measure)]
         name = style.plain(NAMES.get(measure, _looked(measure)))
         sentences = [_effect(row, style, results.people) for row in effects]
-        text = "; ".join(sentences) or "was tested by no analysis of variance"
+        text = "; ".join(sentences) or "was not tested by an analysis of variance"
         more = lacking(results.shortfalls, measure, style)
         for table, words in (
             (results.trends, _trend), (results.scales, _scale), (results.contrasts, _contrast),
@@ -161,7 +161,7 @@ def paragraphs(results: Results, style: Style) -> list[str]:
 
 
 def lacking(shortfalls: "pd.DataFrame", measure: str, style: Style) -> list[str]:
-    """Return in sentences what planned tests of a measure lack: each reason once."""
+    """Return sentences on the shortfalls of a measure's tests: each reason once."""
     factors: dict[tuple[str, str], list[str]] = {}
     for row in _of(shortfalls, measure):
         factors.setdefault((str(row["without"]), str(row["why"])), []).append(str(row["factor"]))
@@ -210,7 +210,9 @@ def _given_up(table: "pd.DataFrame", style: Style) -> str:
     ]
     if not rows:
         return told
-    told += " Successes alone look fast; in the medians a time-out takes longer than it was allowed"
+    told += (
+        " Means of successes alone look fast; in the medians time-outs are censored at the limit"
+    )
     return f"{told}: {'; '.join(_slow(row, style) for row in rows)}."
 
 
@@ -228,7 +230,7 @@ def _slow(row: Mapping[str, Any], style: Style) -> str:
 def f_test(row: Mapping[str, Any], style: Style, people: int) -> str:
     """Return ``F(5.27, 184.33) = 2.43, p = .034, ηp² = .06``, corrected where it matters.
 
-    Behind it stands how many of the sample's people are in it, where not all of them are.
+    The number of participants follows if not all of the sample are in it.
     """
     whole = row["epsilon"] == 1.0
     df = [row["epsilon"] * row["df1"], row["epsilon"] * row["df2"]]
@@ -265,7 +267,7 @@ def _trend(row: Mapping[str, Any], style: Style, results: Results) -> str:
 
 
 def _scale(row: Mapping[str, Any], style: Style, results: Results) -> str:
-    """Return what happened within a phase and from one to the next, over all participants."""
+    """Return the changes within a phase and from one to the next, over all participants."""
     spoken = {
         "slope": "Change with each position of",
         "change": "Mean change to",
@@ -302,16 +304,16 @@ def _contrast(row: Mapping[str, Any], style: Style, results: Results) -> str:
 
 
 def _confounded(row: Mapping[str, Any]) -> str:
-    """Return `` (cannot be told from positions)`` where an effect is confounded."""
-    return f" (cannot be told from {row['confounded']})" if row.get("confounded") else ""
+    """Return `` (cannot be distinguished from positions)`` where an effect is confounded."""
+    return f" (cannot be distinguished from {row['confounded']})" if row.get("confounded") else ""
 
 
 def confounding(anova: "pd.DataFrame") -> list[str]:
-    """Return in a sentence for each what the effects of some factors cannot be told from."""
+    """Return a sentence for each confound that factors cannot be distinguished from."""
     rows = anova[anova["confounded"] != ""].drop_duplicates(["factor", "confounded"])
     return [
-        f"What {' and '.join(own['factor'])} do{'es' if len(own) == 1 else ''} cannot be told from "
-        f"{words}: as these came, either may have made the difference."
+        f"The effect{'s' * (len(own) > 1)} of {' and '.join(own['factor'])} cannot be "
+        f"distinguished from {words}: in these orders, either may have caused the difference."
         for words, own in rows.groupby("confounded")
     ]
 

@@ -50,7 +50,7 @@ KINDS = {
     "false alarms": "false alarm",
     "correct rejections": "correct rejection",
 }
-"""What a test can be of which a deformity was asked."""
+"""Outcomes of a test with a question on a deformity."""
 
 WIDTH = 14
 NO_RATING = "no rating"
@@ -59,8 +59,8 @@ NO_RATING = "no rating"
 def write_workbook(tests: Sequence[OperatorTest], path: Path, kinds: str = "") -> None:
     """Write the workbook of ``tests``, which are in order of operator and time.
 
-    ``kinds`` is the first line of each sheet: ``SIMULATED``, ``PILOT``; nothing where all are
-    people's. Sheets are copied and printed one by one.
+    ``kinds`` is the first line of each sheet: ``SIMULATED``, ``PILOT``; empty if all are real
+    recordings. Sheets are copied and printed one by one.
     """
     from openpyxl import Workbook
 
@@ -103,7 +103,7 @@ def write_csv(tests: Sequence[OperatorTest], path: Path) -> None:
 
 
 def advice(tests: Sequence[OperatorTest]) -> Iterator[Advice]:
-    """Yield what is to be said to each operator."""
+    """Yield the advice for each operator."""
     for _, own in groupby(tests, key=lambda test: test.operator):
         mine = list(own)
         yield suggest(mine)
@@ -227,7 +227,7 @@ def _used(tests: Sequence[OperatorTest]) -> Iterator[tuple[Cell, ...]]:
 
 
 def _begin(sheet: "Worksheet", head: Sequence[str], kinds: str) -> int:
-    """Write what stands above a sheet's rows; return the number of its first row."""
+    """Write the head of a sheet; return the number of its first row."""
     from openpyxl.styles import Font
 
     above = [[kinds], list(head)] if kinds else [list(head)]
@@ -248,13 +248,13 @@ def _fill(sheet: "Worksheet", rows: Iterable[Sequence[Cell]]) -> None:
 
 
 def _safe(value: Cell) -> Cell:
-    """Return a text of others so that no spreadsheet takes it for a formula."""
+    """Return an external text so that spreadsheets do not take it for a formula."""
     written = isinstance(value, str) and value[:1] in {"+", "-", "@"}
     return f"'{value}" if written else value
 
 
 def _detections(tests: Sequence[OperatorTest]) -> Iterator[tuple[Cell, ...]]:
-    """Yield how often each operator was right and wrong about deformities."""
+    """Yield each operator's numbers of right and wrong reports on deformities."""
     for operator in dict.fromkeys(test.operator for test in tests):
         own = [test.detection.kind for test in tests if test.operator == operator]
         if any(own):

@@ -167,7 +167,7 @@ def _tests(
     if unseen:
         leave_out(
             recording.participant,
-            f"saw or heard too little in {', '.join(unseen)}, which count for nothing here "
+            f"saw or heard too little in {', '.join(unseen)}, which are not scored "
             "(presented: in the protocol)",
         )
     if lacking:
@@ -262,13 +262,13 @@ def completion(
     """
     flag = row.get("completion", math.nan)
     if flag in {0, 1}:
-        return flag == 1, "set by the supervisor"
+        return flag == 1, "set by the experimenter"
     if overruled_after:
-        return True, "overridden by the supervisor after its end"
+        return True, "overridden by the experimenter after its end"
     if worst > settings.mistakes and not overruled:
         return False, f"more than {settings.mistakes} mistakes of one kind"
     if row["outcome"] == "success":
-        return True, "overridden by the supervisor" if overruled else "the task was done"
+        return True, "overridden by the experimenter" if overruled else "the task was done"
     return False, f"the trial ended with {row['outcome']}"
 
 

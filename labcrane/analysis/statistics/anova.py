@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LEAST = 3
-"""Participants of a test; with fewer nothing can be said of their variance."""
+"""Fewest participants of a test; with fewer, their variance is unknown."""
 
 NO_VARIANCE = 1e-20
 """Share of all squares that rounding leaves where participants are all alike."""
 
 LEAST_SHARE = 1e-9
-"""Of what a level adds, and of the largest singular value; what is below it comes of rounding."""
+"""Share of a level's effect, and of the largest singular value, below which it is rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Anova:
     Attributes
     ----------
     measure, factor
-        What was tested, over what; an interaction's factors are joined by colons.
+        The measure and the factor; an interaction's factors are joined by colons.
     f
         The F ratio.
     df1, df2
@@ -48,11 +48,11 @@ class Anova:
     left_out
         Participants without a value in some cell, and therefore not in the test.
     people
-        Those who are in it.
+        Participants in the test.
     beside
-        The column that the effect was tested beside; empty where there was nothing to adjust for.
+        The column that the effect was adjusted for; empty without adjustment.
     confounded
-        What the effect cannot be told from, in words; empty where it can, or nobody has looked.
+        What the effect cannot be distinguished from, in words; empty if nothing, or not tested.
     """
 
     measure: str
@@ -79,9 +79,9 @@ class Contrast:
     Attributes
     ----------
     measure, factor
-        What was compared, over what.
+        The measure and the factor.
     at
-        The level of another factor at which it was; "" for the mean over its levels.
+        The level of another factor; "" for the mean over its levels.
     first, second
         The two levels.
     difference, ci_low, ci_high
@@ -93,9 +93,9 @@ class Contrast:
     n
         Participants.
     people
-        Who they are.
+        Their names.
     confounded
-        What the difference cannot be told from, in words; empty where it can, or nobody has looked.
+        What the difference cannot be distinguished from, in words; empty if nothing, or not tested.
     """
 
     measure: str
@@ -129,11 +129,11 @@ class FactorialDesign:
     model
         Intercept and sum-to-zero columns of the factors between, one row per participant.
     terms
-        Which columns of the model are whose; ``()`` is the intercept.
+        Columns of the model by term; ``()`` is the intercept.
     beside
         Shares of what is adjusted for in each cell, sum-to-zero: participants, cells, columns.
     left_out
-        Participants who lack a cell.
+        Participants without a value in some cell.
     people
         Those who have all of them, in the order of the rows.
     """
@@ -162,8 +162,8 @@ def design(
 ) -> FactorialDesign | None:
     """Return the cells of a design; None where fewer than three whole participants are left.
 
-    A participant's value in a cell is the mean over their rows there. A factor of one level is no
-    factor.
+    A participant's value in a cell is the mean over their rows there. A factor of one level is
+    ignored.
     """
     known = table.dropna(subset=[measure])
     levels = _levels(known, within)
@@ -187,9 +187,9 @@ def design(
 def whole_people(
     table: "pd.DataFrame", measure: str, within: Sequence[str]
 ) -> tuple[list[str], list[tuple[Any, ...]]]:
-    """Return who has a value in every cell of a design, and the cells in which nobody has one.
+    """Return who has a value in every cell of a design, and the cells without any value.
 
-    Of levels at which nobody has a value, and of factors of one level, there are no cells.
+    Levels without any value, and factors of one level, have no cells.
     """
     known = table.dropna(subset=[measure])
     wide = _cells(known, known[measure], _levels(known, within))
@@ -266,7 +266,7 @@ def analyse(
     between: Sequence[str] = (),
     beside: str = "",
 ) -> list[Anova]:
-    """Test every effect of a design within, between or mixed; none where it cannot be.
+    """Test every effect of a within, between or mixed design that can be tested.
 
     Type III sums of squares of a multivariate linear model with sum-to-zero contrasts, so that
     groups may be of unequal size (O'Brien & Kaiser 1985, Psychological Bulletin 97:316-333);
@@ -279,8 +279,8 @@ def analyse(
     within, between
         Columns that vary within and between participants.
     beside
-        A column whose levels add something of their own, which every effect is tested beside: an
-        analysis of covariance in each stratum. What cannot be told from it is not tested.
+        A column whose levels every effect is adjusted for: an analysis of covariance in each
+        stratum. Effects that cannot be distinguished from it are not tested.
     """
     cells = design(table, measure, within, between, beside)
     if cells is None:
@@ -308,9 +308,9 @@ def analyse(
 
 
 def _rest(model: FloatArray, seen: FloatArray, adds: FloatArray) -> tuple[FloatArray, int]:
-    """Return what a model between participants leaves, beside what is adjusted for; its freedom.
+    """Return the residuals of a model between participants, adjusted, and their degrees of freedom.
 
-    What is adjusted for adds the same to every contrast and participant, by least squares.
+    The adjustment adds the same to every contrast and participant, by least squares.
     """
     people, contrasts, size = adds.shape
     outside = np.eye(people) - model @ np.linalg.pinv(model)
@@ -383,7 +383,7 @@ def compare(
     between: Sequence[str] = (),
     at: str = "",
 ) -> list[Contrast]:
-    """Compare the levels of one factor two by two, corrected after Holm.
+    """Compare the levels of one factor pairwise, corrected after Holm.
 
     The means are those of the whole design, every cell weighted alike; each difference has the
     variance of its own participants' differences, as in a multivariate model.
@@ -391,7 +391,7 @@ def compare(
     Parameters
     ----------
     at
-        A factor within participants, at each of whose levels the comparison is made by itself.
+        A factor within participants; the comparison is made separately at each of its levels.
     """
     cells = design(table, measure, within, between)
     if cells is None or factor not in {**cells.within, **cells.between}:
@@ -428,7 +428,7 @@ def compare(
 
 
 def word(level: Any) -> str:
-    """Return a level as contrasts name it."""
+    """Return a level's name in contrasts."""
     return "" if level is None else f"{level:g}" if isinstance(level, float) else str(level)
 
 

@@ -1,4 +1,4 @@
-"""Confounding: whether what one factor does can be told from what others do."""
+"""Confounding: whether the effects of factors can be distinguished."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -20,19 +20,19 @@ def dummies(labels: "np.typing.NDArray[np.integer[Any]]") -> FloatArray:
 def told_apart(
     table: "pd.DataFrame", factor: Sequence[str], beside: Sequence[Sequence[str]]
 ) -> bool:
-    """Return whether all differences of a factor's levels can be told from what others do.
+    """Return whether all differences of a factor's levels can be distinguished from other effects.
 
-    They can where the rank says so: each level but one adds a direction of its own to a linear
-    model of the others. How precisely is another question.
+    The criterion is the rank: each level except one adds a dimension to a linear model of the
+    others. It does not measure the precision.
 
     Parameters
     ----------
     table
         One row per movement.
     factor
-        Its columns; a level is what they hold together.
+        Its columns; a level is a combination of their values.
     beside
-        The same of each of the others.
+        The same for each of the others.
     """
     names = list(dict.fromkeys([*factor, *(name for other in beside for name in other)]))
     rows = table[names].drop_duplicates()

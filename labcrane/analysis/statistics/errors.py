@@ -8,14 +8,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 CONDITION = ("session", "block", "distance", "far_side", "direction")
-"""What movements of one condition have in common, of the columns that there are."""
+"""Columns that define a condition, if present."""
 
 
 def errors(results: "pd.DataFrame") -> "pd.DataFrame":
     """Return the errors of each participant, one row each, in m.
 
     ``constant_error_m`` is the mean signed error along the task axis, and ``absolute_error_m`` the
-    mean of its size. ``variable_error_m`` is how far movements of one condition are spread about
+    mean of its size. ``variable_error_m`` is the spread of movements of one condition about
     their mean along the axis (Schmidt & Lee 2011, Motor Control and Learning): the root
     of the conditions' variances, averaged by their degrees of freedom; NaN where no condition has
     two movements. ``radial_error_m`` is the mean distance from the target's centre, in any

@@ -19,10 +19,10 @@ WIDTH_FACTOR = math.sqrt(2.0 * math.pi * math.e)
 """4.133: an effective width holds the middle 96 % of normally distributed ends."""
 
 POOL_BELOW = 15
-"""Fewer ends than this do not give a condition a width of its own."""
+"""Minimum number of ends for a condition's own width."""
 
 CONDITION = ("distance", "width")
-"""Columns that say to which condition a movement belongs."""
+"""Columns that define the condition of a movement."""
 
 
 def difficulty(distance: float, width: float) -> float:
@@ -46,7 +46,7 @@ class Regression:
     intercept_ci, slope_ci
         95 % confidence intervals.
     r2
-        Share of variance explained; NaN of a mean of lines.
+        Share of variance explained; NaN for a mean of lines.
     n
         Number of points, or of lines.
     """
@@ -81,9 +81,9 @@ def regress(difficulty_bit: FloatArray, movement_time: FloatArray) -> Regression
 
 
 def mean_line(lines: Sequence[Regression]) -> Regression | None:
-    """Return the mean of participants' lines, with intervals over people; None of fewer than two.
+    """Return the mean of participants' lines, with intervals over people; None for fewer than two.
 
-    People differ, and each has several points: points of all together are no independent ones.
+    People differ, and each has several points: the points of all are not independent.
     """
     from scipy.stats import t
 

@@ -1,7 +1,7 @@
 """Learning curves, fitted to each participant alone.
 
-Averaged curves look like power functions even when nobody's is one (Heathcote, Brown & Mewhort
-2000, Psychonomic Bulletin & Review 7:185-207), so nothing is averaged before it is fitted.
+Averaged curves look like power functions even when no participant's is one (Heathcote, Brown &
+Mewhort 2000, Psychonomic Bulletin & Review 7:185-207), so nothing is averaged before it is fitted.
 """
 
 import math
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 PARAMETERS = 3
 RATE_BOUNDS = (1e-3, 10.0)
-"""Beyond these a curve is a straight line, or has ended before its second point."""
+"""Bounds of rates: beyond them a curve is a straight line, or ends before its second point."""
 
 
 def exponential(n: FloatArray, asymptote: float, gain: float, rate: float) -> FloatArray:
@@ -42,16 +42,16 @@ RUNS: dict[str, Callable[[FloatArray], FloatArray]] = {
     "exponential": lambda n: n - 1.0,
     "power": np.log,
 }
-"""What a curve's gain falls along: both are asymptote + gain · exp(-rate · run)."""
+"""Run variable of a curve's gain: both are asymptote + gain · exp(-rate · run)."""
 
 CLEARLY = 2.0
-"""Difference of AICc from which on one model is held to be better than another."""
+"""Difference of AICc from which one model is considered better than another."""
 
 EDGE = 1e-3
 """Share of the values' spread within which an asymptote is at its bound."""
 
 RATES = np.geomspace(*RATE_BOUNDS, 60)
-"""Rates at which a search looks first."""
+"""Initial rates of a search."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +63,9 @@ class LearningCurve:
     curve
         ``exponential`` or ``power``.
     asymptote, gain
-        Practised value and what the first repetition has beyond it, in the measure's unit.
+        Practised value and the first repetition's difference from it, in the measure's unit.
     rate
-        How fast the gain wears off, per repetition (exponential) or as an exponent (power).
+        Rate of the gain's decay, per repetition (exponential) or as an exponent (power).
     asymptote_se, gain_se, rate_se
         Standard errors from the curvature at the solution; infinite where it is flat.
     aicc
@@ -98,7 +98,7 @@ class LearningCurve:
 def fit_curve(curve: str, n: FloatArray, values: FloatArray) -> LearningCurve | None:
     """Fit one curve by least squares with bounds; None with fewer points than parameters + 1.
 
-    Gains may be negative: who gets worse is fitted as well. Values that are all positive, as times
+    Gains may be negative: worsening is fitted as well. Values that are all positive, as times
     are, have an asymptote of 0 or more. The search starts at the best of many
     rates, as at each the other two follow from a straight line.
     """

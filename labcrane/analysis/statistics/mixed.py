@@ -1,4 +1,4 @@
-"""Linear mixed model of a measure of each movement, with how people differ beside it.
+"""Linear mixed model of a measure of each movement, with differences between people.
 
 Fitted as lme4 fits it (Bates, Mächler, Bolker & Walker 2015, Journal of Statistical Software 67:1):
 the restricted likelihood is profiled over all but the covariance of people's intercepts and slopes,
@@ -31,29 +31,29 @@ TIMES = (
     "movement_time", "onset_to_rest", "circle_to_circle", "reaction_time", "movement_onset",
     "main_stroke_time",
 )  # fmt: skip
-"""How long people take is above 0 and skewed to the right: its logarithm is modelled."""
+"""Times are above 0 and skewed to the right: their logarithm is modelled."""
 
 LEAST = 3
 """Participants of a model."""
 
 DEPENDENT = 1e-8
-"""Share of a column that is left beside those before it; below it, it follows from them."""
+"""Residual share of a column given those before it; below it, it is linearly dependent."""
 
 BOUNDARY = 1e-4
-"""Least eigenvalue of people's covariance against the residual; below it there is none of it."""
+"""Minimum eigenvalue of people's covariance relative to the residual; below it, it is zero."""
 
 LEAST_SCATTER = 1e-5
 """Share of the values' standard deviation; below it, rounding spoils the sums of squares."""
 
 FLAT = 1e-7
-"""Deviance that tells nothing apart."""
+"""Negligible difference of deviance."""
 
 STARTS = ((1.0, 0.0, 1.0), (0.1, 0.0, 0.1), (0.1, 0.0, 0.01))
-"""Where the fit begins; the best end counts. Factors of the covariance over the residual."""
+"""Start values of the fit; the best result is used. Factors of the covariance over the residual."""
 
 
 class NoModelError(Exception):
-    """There is nothing to fit a model to; the text says why."""
+    """A model cannot be fitted; the message gives the reason."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,10 +68,10 @@ class MixedModel:
     Attributes
     ----------
     measure
-        What was modelled.
+        The modelled measure.
     log
         Whether its logarithm was: of :data:`TIMES`, unless a value is 0 or less. Other measures are
-        modelled as they are, since they have a sign, or a value of 0 that means something.
+        modelled untransformed, since they have a sign, or a value of 0 that means something.
     terms
         One row per fixed term: term, estimate, standard error, t, Satterthwaite's degrees of
         freedom, p.
@@ -82,7 +82,7 @@ class MixedModel:
     slope_sd
         That of the slopes over the sequence; NaN where everybody has a single position.
     residual_sd
-        That of what is left.
+        That of the residuals.
     boundary
         Whether people's intercepts and slopes have a combination without any variance (lme4 calls
         the fit singular). Estimates and tests hold; the standard deviations are at their bound.
@@ -146,8 +146,8 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel:
     scatter = _scatter(columns[:, kept], y, random, who)
     if scatter <= LEAST_SCATTER * float(y.std()):
         raise NoModelError(
-            "the terms and each participant's mean and slope give every value, so that there is no "
-            "scatter to test them against"
+            "the terms and each participant's mean and slope fit every value exactly, so there is "
+            "no residual variance to test against"
         )
     fit = _Fit(columns[:, kept], y, random, who, scatter)
     t = fit.estimates / fit.errors
@@ -181,7 +181,7 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel:
 
 
 def _modelled(movements: "pd.DataFrame", measure: str) -> tuple["pd.DataFrame", bool]:
-    """Return what the model is fitted to, terms centred, and whether it is of the logarithm."""
+    """Return the model's data, terms centred, and whether it is of the logarithm."""
     names = [*FIXED, *(name for name in DESIGN if name in movements), "participant"]
     table = movements[[measure, *names]].dropna()
     log = measure in TIMES and bool((table[measure] > 0.0).all())
@@ -212,7 +212,7 @@ def _columns(data: "pd.DataFrame") -> tuple[list[str], FloatArray]:
 
 
 def _coded(name: str, values: "pd.Series[Any]") -> dict[str, FloatArray]:
-    """Return a number as it is, and of levels one column each but for the first."""
+    """Return a number unchanged, and one column for each level except the first."""
     from pandas.api.types import is_bool_dtype, is_numeric_dtype
 
     if is_numeric_dtype(values) and not is_bool_dtype(values):
@@ -244,7 +244,7 @@ def _scatter(x: FloatArray, y: FloatArray, z: FloatArray, who: Any) -> float:
 class _Fit:
     """The fit of ``y = x·b + z·u + e`` with u of each participant and e normal.
 
-    Everything is worked out of cross products of each participant. Columns are scaled to about 1
+    Everything is computed from cross products of each participant. Columns are scaled to about 1
     and ``y`` to a residual of about 1 before, and results are scaled back.
     """
 

@@ -24,7 +24,7 @@ class Reported:
 
 @dataclass(frozen=True, slots=True)
 class Consistency:
-    """What recomputing a printed test gives.
+    """The result of recomputing a printed test.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Consistency:
     p_low, p_high
         The smallest and the largest p that printed values could have been rounded from.
     p_consistent
-        Whether the printed p is among them.
+        Whether the printed p is in this range.
     eta2p
         Partial eta squared from the printed values.
     eta2p_low, eta2p_high

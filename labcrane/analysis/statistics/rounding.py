@@ -1,11 +1,11 @@
-"""Rounding: differences that come of it alone, of which no test is made."""
+"""Rounding: differences caused by it alone, which are not tested."""
 
 import numpy as np
 
 from labcrane.types import FloatArray
 
 ROUNDING = 1e-10
-"""Share of the largest number; a difference below it comes of rounding."""
+"""Share of the largest number; a smaller difference is due to rounding."""
 
 
 def alike(values: FloatArray) -> bool:
@@ -14,13 +14,13 @@ def alike(values: FloatArray) -> bool:
 
 
 def without_rounding(differences: FloatArray, of: FloatArray) -> FloatArray:
-    """Return differences of values, with 0 in place of what rounding left of equal ones.
+    """Return differences of values, with 0 where they are due to rounding.
 
     Parameters
     ----------
     differences
         Any differences, slopes or means of differences.
     of
-        The values that they are worked out of, which give the scale.
+        The values of the differences, which give the scale.
     """
     return np.where(np.abs(differences) <= ROUNDING * np.abs(of).max(initial=0.0), 0.0, differences)

@@ -1,4 +1,4 @@
-"""Time-outs: counted, and kept in the picture by a median in which they are unfinished."""
+"""Time-outs: their counts, and medians in which they are censored."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -17,9 +17,9 @@ HALF = 0.5
 
 
 def median_time(seconds: FloatArray, finished: FloatArray) -> float:
-    """Return the time by which half is finished, after Kaplan and Meier; NaN where fewer are.
+    """Return the time by which half is finished, after Kaplan and Meier; NaN if fewer are.
 
-    Of what was not finished it is only known that it takes longer: a mean of what was makes a
+    Unfinished trials are only known to take longer: a mean of finished ones makes a
     hard condition look fast (Kaplan & Meier 1958, JASA 53:457-481). Where exactly half is
     finished between two times, their middle is returned, as R's ``survival`` does.
 
@@ -47,11 +47,11 @@ def median_time(seconds: FloatArray, finished: FloatArray) -> float:
 
 
 def time_outs(movements: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
-    """Return for each condition how many were done and given up, and how long they took.
+    """Return for each condition the numbers of finished and unfinished trials, and their times.
 
     There is at least one column to go ``by``. ``seconds`` count from the trial's start, pauses left
     out. Practice, repeated attempts and what was not shown are not in it; trials that were skipped
-    or ended by somebody are counted as neither, and so are successes in which nothing moved.
+    or ended by a person are counted as neither, and so are successes in which nothing moved.
     """
     import pandas as pd
 

@@ -37,7 +37,7 @@ FROM_BEFORE = ("change", "difference score", "net gain")
 TAKEN = "pairs' means taken away"
 """An adjustment that was made: what pairs of targets add is taken away."""
 
-APART = "positions cannot be told from pairs of targets"
+APART = "positions cannot be distinguished from pairs of targets"
 """Why one could not be made."""
 
 LEAST_SHARE = 1e-9
@@ -128,9 +128,9 @@ def _shares(pairs: "pd.Series[Any]", kinds: "Sequence[Any]") -> "pd.DataFrame":
 def quantities(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
     """Return each participant's :data:`QUANTITIES`, one row per participant, phase and quantity.
 
-    What pairs of targets add is taken away, and ``adjustment`` says whether it was. Whoever lacks a
-    first or last position has nothing that goes by it, and whoever lacks a phase nothing that goes
-    from it to the next: what stands beside them is no stand-in.
+    Values are adjusted for pairs of targets, and ``adjustment`` states whether they were. A
+    participant without a first or last position has no quantity that needs it, and one without a
+    phase has none from that phase to the next: neighbours are not substituted.
 
     Parameters
     ----------

@@ -81,10 +81,10 @@ def linear_trend(movements: "pd.DataFrame", measure: str) -> Trend | None:
 
 
 def holm(p: Sequence[float]) -> list[float]:
-    """Return p-values corrected after Holm (1979); a NaN is no test and does not count as one.
+    """Return p-values corrected after Holm (1979); a NaN is not a test and is not counted.
 
-    The smallest is taken as often as there are tests, the next as often as are left, and none is
-    below the one before it.
+    The smallest is multiplied by the number of tests, the next by the number that are left, and
+    none is below the one before it.
     """
     # statsmodels' multipletests collects all garbage in every call, a fifth of a second.
     corrected, largest = list(p), 0.0

@@ -73,7 +73,7 @@ class Dataset:
         Raises
         ------
         RecordingError
-            There is nobody of that name, or nobody has such a session.
+            No participant has that name, or none has such a session.
         """
         keys = key if isinstance(key, tuple) else (key,)
         if len(keys) > 3:  # noqa: PLR2004 - participant, session, trial
@@ -94,7 +94,7 @@ class Dataset:
         if chosen.sessions is not None and not any(
             number in chosen.sessions for person in people for number in person.usable
         ):
-            raise RecordingError(f"nobody selected has session {chosen.sessions[0]}")
+            raise RecordingError(f"no selected participant has session {chosen.sessions[0]}")
         return chosen
 
     def select(self, *columns: str) -> "Dataset":
@@ -202,5 +202,5 @@ def _is_all(chosen: Chosen) -> bool:
 
 def _number(chosen: Chosen) -> int:
     if isinstance(chosen, bool) or not isinstance(chosen, int | np.integer):
-        raise RecordingError(f"{chosen!r} is no number of a session or trial; give one, or :")
+        raise RecordingError(f"{chosen!r} is not the number of a session or trial; give one, or :")
     return int(chosen)

@@ -16,22 +16,23 @@ MEASURES: Mapping[str, tuple[str, str]] = {
     ),
     "measured_anew": (
         "1",
-        "1 where the recording has onset and times by a former rule, and here they are by today's",
+        "1 where the recording used a former rule for onset and times, and the present rule is "
+        "used here",
     ),
     "halts": (
         "1",
-        "stretches between onset and offset in which the tip is no faster than onset_speed for "
-        "onset_hold or longer; the rest in which the movement ends is none",
+        "stretches between onset and offset in which the tip is not faster than onset_speed for "
+        "onset_hold or longer; the final rest is not one",
     ),
-    "halt_time": ("s", "how long the halts are together"),
+    "halt_time": ("s", "total duration of the halts"),
     "main_stroke_time": (
         "s",
         "of the stroke with the highest speed, from the halt before it to the one behind it",
     ),
-    "amplitude": ("m", "way made along the task axis, from onset to offset"),
+    "amplitude": ("m", "distance along the task axis, from onset to offset"),
     "path_ratio": (
         "1",
-        "length of the way, low-pass filtered, over the straight distance between its ends",
+        "path length, low-pass filtered, divided by the straight distance between its ends",
     ),
     "peak_speed_tip": ("m/s", "largest speed of the tip between onset and offset"),
     "sub_movements": ("1", "peaks of the tip's speed, low-pass filtered"),
@@ -49,4 +50,4 @@ MEASURES: Mapping[str, tuple[str, str]] = {
     "effort": ("1", "root mean square of the joint commands, as a fraction of full speed"),
     "limit_hits": ("1", "times a joint came to one of its limits"),
 }
-"""Unit and meaning of what is measured here; the trial table's own columns stand beside it."""
+"""Unit and meaning of what is measured here; the trial table's own columns come in addition."""

@@ -1,4 +1,4 @@
 """The commands, one module for each group of them.
 
-In come arguments that typer has parsed; each command imports what it needs when it runs.
+Input: arguments that typer has parsed. Each command imports what it needs when it runs.
 """

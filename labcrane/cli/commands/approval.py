@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 def approve(
     protocol: ProtocolPath,
-    board: Annotated[str, typer.Option(help="who approved it")],
-    reference: Annotated[str, typer.Option(help="the board's number of the approval")],
+    board: Annotated[str, typer.Option(help="the board that approved the study")],
+    reference: Annotated[str, typer.Option(help="the board's reference number of the approval")],
     valid_until: Annotated[str, typer.Option(help="last day on which people may take part")],
     consent: Annotated[Path, typer.Option(help="the consent text, in the protocol's folder")],
 ) -> None:
-    """Rehearse a protocol and lock it, with everything it refers to, as approved.
+    """Rehearse a protocol, then lock it with everything it refers to, as approved.
 
-    Nothing is locked while check or the rehearsal asks something.
+    Nothing is locked while check or the rehearsal raises a warning.
     """
     from labcrane.approval import decision
     from labcrane.protocol.study import load
@@ -37,7 +37,7 @@ def approve(
     materials = lock.content["materials"]
     files = ", ".join(materials["files"]) or "no files"
     out.print(
-        f"{lock.path}: approved until {valid_until}; locked are the protocol, {files}, "
+        f"{lock.path}: approved until {valid_until}; locked: the protocol, {files}, "
         f"{lock.approval['consent']} (version {lock.consent_version}), labcrane "
         f"{materials['labcrane']['version']} and the plugins {', '.join(materials['plugins'])}",
         markup=False,
@@ -45,12 +45,12 @@ def approve(
 
 
 def _rehearse(study: "Study") -> None:
-    """Rehearse a study that is to be locked: to answer a question later is an amendment.
+    """Rehearse a study before it is locked: later answers to warnings would be amendments.
 
     Raises
     ------
     ProtocolError
-        Something is asked of the study.
+        The study raises warnings.
     """
     from labcrane.protocol.questions import about, questions
     from labcrane.simulation.rehearsal import rehearse
@@ -58,19 +58,19 @@ def _rehearse(study: "Study") -> None:
     open_ones = (*questions(study), *rehearse(study).questions)
     if open_ones:
         asked = [about(study, each)["whole"] for each in open_ones]
-        last = "nothing was locked: answer what is asked above first"
+        last = "nothing was locked; answer the warnings above first"
         raise ProtocolError("\n".join([*asked, last]))
 
 
 def amend(
     protocol: ProtocolPath,
     why: Annotated[str, typer.Option(help="why it was changed")],
-    reference: Annotated[str, typer.Option(help="the board's number of the amendment")],
+    reference: Annotated[str, typer.Option(help="the board's reference number of the amendment")],
     board: Annotated[str | None, typer.Option(help="as before by default")] = None,
     valid_until: Annotated[str | None, typer.Option(help="as before by default")] = None,
     consent: Annotated[Path | None, typer.Option(help="as before by default")] = None,
 ) -> None:
-    """Record what was changed in an approved study, and keep the history."""
+    """Record changes to an approved study and keep its history."""
     from labcrane.approval import decision
     from labcrane.approval.lock import read_lock
     from labcrane.protocol.study import load
@@ -94,9 +94,7 @@ def amend(
 
 def methods(
     protocol: ProtocolPath,
-    codebook: Annotated[
-        Path | None, typer.Option(help="where the codebook goes: a CSV file")
-    ] = None,
+    codebook: Annotated[Path | None, typer.Option(help="the codebook's path: a CSV file")] = None,
 ) -> None:
     """Write the Methods paragraph and the codebook of an approved study."""
     from labcrane.approval.codebook import as_csv
@@ -113,9 +111,9 @@ def methods(
 
 def bundle(
     protocol: ProtocolPath,
-    folder: Annotated[Path, typer.Argument(help="a new folder for it: a stick, for instance")],
+    folder: Annotated[Path, typer.Argument(help="a new folder, for example on a USB stick")],
 ) -> None:
-    """Write a folder from which a computer like this one installs the study without network."""
+    """Write a folder that installs the study offline on a similar computer."""
     from labcrane.approval.bundle import bundle as write
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
@@ -134,9 +132,9 @@ def read_date(text: str) -> date:
     try:
         return date.fromisoformat(text)
     except ValueError:
-        raise ProtocolError(f"{text!r} is no date; write it as 2027-12-31") from None
+        raise ProtocolError(f"{text!r} is not a date; write it as 2027-12-31") from None
 
 
 def today() -> date:
-    """Return the day it is here."""
+    """Return the local date."""
     return datetime.now().astimezone().date()

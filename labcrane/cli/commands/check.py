@@ -25,9 +25,9 @@ def new_study(
             help="aiming, crane_pilot, crossover, pre_post, retrieval, washout or whole"
         ),
     ],
-    folder: Annotated[Path, typer.Argument(help="a new folder; the study takes its name")],
+    folder: Annotated[Path, typer.Argument(help="a new folder; the study is named after it")],
 ) -> None:
-    """Copy a study that comes with labcrane, with everything it refers to, for you to change."""
+    """Copy a study that comes with labcrane, with everything it refers to, as a starting point."""
     from labcrane.cli.shipped import new_study as copied
 
     protocol = copied(shipped, folder)
@@ -38,11 +38,12 @@ def check(
     protocol: ProtocolPath,
     as_json: AsJson = False,
     simulated: Annotated[
-        bool, typer.Option("--simulated", help="what a simulation needs must be installed, no more")
+        bool,
+        typer.Option("--simulated", help="require only what a simulation needs to be installed"),
     ] = False,
     rehearse: Annotated[
         bool,
-        typer.Option("--rehearse", help="run one trial of each block for every group as well"),
+        typer.Option("--rehearse", help="also run one trial of each block for every group"),
     ] = False,
 ) -> None:
     """Check a protocol and everything it refers to, without running it."""
@@ -90,7 +91,7 @@ def check(
 def examined(
     protocol: Path, *, simulated: bool = False
 ) -> "tuple[Study, tuple[CheckQuestion, ...]]":
-    """Return a study, and what is asked of it: the same for a terminal, a program and an editor.
+    """Return a study and its warnings: the same for a terminal, a program and an editor.
 
     Raises
     ------
@@ -115,18 +116,19 @@ def examined(
 def plan(
     protocol: ProtocolPath,
     participants: Annotated[
-        int | None, typer.Option(help="how many to list; as many as are planned by default", min=1)
+        int | None,
+        typer.Option(help="number of participants to list; the planned number by default", min=1),
     ] = None,
     participant: Annotated[
         str | None, typer.Option(help="one participant only, by pseudonym")
     ] = None,
     export: Annotated[
-        Path | None, typer.Option(help="write the whole allocation into this CSV file as well")
+        Path | None, typer.Option(help="also write the complete allocation to this CSV file")
     ] = None,
     data: DataBeside = None,
     as_json: AsJson = False,
 ) -> None:
-    """Show blocks, each participant's order, and how long a session is likely to take."""
+    """Show blocks, each participant's order and the expected session duration."""
     from labcrane.cli.commands.approval import today
     from labcrane.design.allocation import allocate, as_csv, balance
     from labcrane.design.plan import plan_session
@@ -202,7 +204,7 @@ def _row(session: "SessionPlan") -> dict[str, object]:
 
 
 def _track_row(block: "PlannedBlock") -> dict[str, object] | None:
-    """Return what can be said of levels that are chosen only while a session runs."""
+    """Return what is known about levels that are chosen only while a session runs."""
     track = block.track
     if track is None:
         return None
@@ -244,7 +246,7 @@ def _block(block: "PlannedBlock") -> str:
 
 
 def _track(block: "PlannedBlock", track: "PlannedTrack") -> str:
-    """Return what a track does in a block: its levels are not known before the session."""
+    """Describe a track in a block: its levels are not known before the session."""
     settings = track.settings
     first = block.trials[0].planned.condition["track_level"]
     by_number = sorted(settings.levels, key=settings.levels.__getitem__)
@@ -256,7 +258,7 @@ def _track(block: "PlannedBlock", track: "PlannedTrack") -> str:
 
 
 def _other(step: "PlannedStep") -> str:
-    """Return what a step is that has no trials."""
+    """Describe a step without trials."""
     if step.kind == "break":
         return f"break of {step.seconds:g} s"
     if step.kind == "fixation":

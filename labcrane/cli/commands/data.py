@@ -26,7 +26,7 @@ def where(participant: Someone, data: Data = HERE) -> None:
 
     found = inventory(Places(data), participant)
     if not found:
-        out.print(f"nothing of {participant} is in {data}, nor known to its register", markup=False)
+        out.print(f"{data} and its register contain no data of {participant}", markup=False)
         return
     _list(found)
 
@@ -37,7 +37,7 @@ def erase(
     yes: Annotated[bool, typer.Option("--yes", help="do not ask; for scripts")] = False,
     data: Data = HERE,
 ) -> None:
-    """Remove a participant's data from everything labcrane wrote; a tombstone stays."""
+    """Erase a participant's data from everything labcrane wrote; an erasure record stays."""
     from labcrane.participants import recovery as unfinished
     from labcrane.participants.erasure import BEYOND
     from labcrane.participants.folders import Places
@@ -50,14 +50,12 @@ def erase(
     for path in done.mentions:
         out.print(f"still mentions {participant}: {path}", markup=False)
     for what in done.unsearched:
-        out.print(
-            f"cannot be searched for {participant}; open it yourself, and see: {what}", markup=False
-        )
+        out.print(f"cannot be searched for {participant}; check it yourself: {what}", markup=False)
     out.print(f"{participant} is erased. {BEYOND}", markup=False)
 
 
 def _confirm_erasure(places: "Places", participant: str) -> None:
-    """Show what will go, and have the pseudonym typed again."""
+    """List what will be erased, and require the pseudonym as confirmation."""
     from labcrane.participants.inventory import inventory
 
     found = inventory(places, participant)
@@ -87,11 +85,11 @@ def _list(found: "Sequence[InventoryEntry]") -> None:
 
 def relabel(
     participant: Someone,
-    to: Annotated[str, typer.Argument(help="the right pseudonym")],
+    to: Annotated[str, typer.Argument(help="the correct pseudonym")],
     reason: Reason = "wrong number entered",
     data: Data = HERE,
 ) -> None:
-    """Repair a wrong participant number in files, journals, register and exports."""
+    """Correct a wrong pseudonym in files, journals, register and exports."""
     from labcrane.participants import recovery as unfinished
     from labcrane.participants.folders import Places
 
@@ -100,9 +98,9 @@ def relabel(
 
 
 def transfer(
-    to: Annotated[Path, typer.Argument(help="folder of the lab's store")], data: Data = HERE
+    to: Annotated[Path, typer.Argument(help="folder of the lab's storage")], data: Data = HERE
 ) -> None:
-    """Copy finished sessions to the lab's store, and prove that both sides are equal."""
+    """Copy finished sessions to the lab's storage and verify both copies (SHA-256)."""
     from labcrane.participants import recovery as unfinished
     from labcrane.participants.folders import Places
 
@@ -121,19 +119,18 @@ def _say(reach: "Reach") -> None:
         out.print(f"changed: {path}", markup=False)
     for what in reach.again:
         out.print(
-            f"removed, since it was worked out of everybody's data; make it again: {what}",
+            f"removed, since it was computed from all participants' data; make it again: {what}",
             markup=False,
         )
     for owed in reach.owed:
         if owed.link:
             out.print(
-                f"a link, which is not followed; remove what is behind it, then the link: "
-                f"{owed.folder}",
+                f"a link, which is not followed; remove its target, then the link: {owed.folder}",
                 markup=False,
             )
             continue
         out.print(
-            f"cannot be reached now, and is done by the next call of erase, relabel or transfer "
-            f"that finds it: {owed.folder}",
+            f"cannot be reached now; the next erase, relabel or transfer that finds it completes "
+            f"it: {owed.folder}",
             markup=False,
         )

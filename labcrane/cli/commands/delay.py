@@ -1,4 +1,4 @@
-"""Command that measures how long views and sounds take, by a photodiode or a microphone."""
+"""Command that measures the delay of views and sounds, by a photodiode or a microphone."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,16 +19,16 @@ AUDIO = (
 def measure_display(
     protocol: Path, stream: str | None, name: str | None, count: int, channel: int = 1
 ) -> None:
-    """Measure the delay of a view; without a stream, say what is known of all of them.
+    """Measure the delay of a view; without a stream, print the known delays of all views.
 
     Parameters
     ----------
     stream, channel
-        The photodiode's stream, and which of its channels, counted from 1.
+        The photodiode's stream, and the number of its channel, from 1.
     name
         The protocol's name for the view; the only one by default.
     count
-        How many times the patch turns over.
+        Number of changes of the patch.
     """
     _measure(protocol, "view", DISPLAY, stream, name, count, channel)
 
@@ -61,7 +61,7 @@ def _measure(
         _say_known(protocol, word, guide, there)
         return
     if name is None or name not in there:
-        asked = f"say which {word} with --name" if name is None else f"there is no {word} {name!r}"
+        asked = f"choose a {word} with --name" if name is None else f"there is no {word} {name!r}"
         raise ProtocolError(f"{asked}; there is {', '.join(there) or 'none'}")
     from labcrane.feedback.measure_delay import measure
 
@@ -80,7 +80,7 @@ def _measure(
 
 
 def _say_known(protocol: Path, word: str, guide: str, there: Sequence[str]) -> None:
-    """Print what was measured before, and how to measure it."""
+    """Print earlier measurements, and how to measure."""
     from labcrane.feedback.delays import NOT_MEASURED, delay_in_words, read_delays
 
     known = read_delays(protocol)

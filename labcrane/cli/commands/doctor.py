@@ -1,4 +1,4 @@
-"""Commands that look at the computer: before a study day, and for a report of a problem."""
+"""Commands that check the computer before a study day, and report a problem."""
 
 import json
 import sys
@@ -34,16 +34,14 @@ MOST_LINES = 60
 def doctor(
     protocol: Annotated[
         Path | None,
-        typer.Option(
-            help="look at what this study needs, and at nothing else", callback=protocol_in
-        ),
+        typer.Option(help="check only what this study needs", callback=protocol_in),
     ] = None,
     data: DataBeside = None,
     peer: Annotated[
-        list[str] | None, typer.Option(help="computer that sends a stream; may be given again")
+        list[str] | None, typer.Option(help="computer that sends a stream; may be repeated")
     ] = None,
     move: Annotated[
-        bool, typer.Option("--move", help="you are there to move the controls as you are told")
+        bool, typer.Option("--move", help="you can move the controls when asked")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="print JSON, for scripts")] = False,
     display: Annotated[
@@ -55,19 +53,21 @@ def doctor(
     stream: Annotated[
         str | None, typer.Option(help="LSL stream of the sensor; without it nothing is measured")
     ] = None,
-    channel: Annotated[int, typer.Option(help="which channel of it", min=1)] = 1,
+    channel: Annotated[int, typer.Option(help="the stream's channel", min=1)] = 1,
     name: Annotated[
         str | None, typer.Option(help="which view or sound; the only one by default")
     ] = None,
     count: Annotated[int, typer.Option(help="how many changes are presented", min=2)] = 100,
     local: Local = False,
 ) -> None:
-    """Check the computer before a study day: every line says how it is and what to do."""
+    """Check this computer before a study day, with a remedy for each problem."""
     if local:
         stay_on_this_computer()
     if display or audio:
         if protocol is None:
-            raise ProtocolError("say whose views and sounds to measure: --protocol protocol.yaml")
+            raise ProtocolError(
+                "give the study whose views and sounds to measure: --protocol protocol.yaml"
+            )
         for wanted, measure in ((display, measure_display), (audio, measure_audio)):
             if wanted:
                 measure(protocol, stream, name, count, channel)
@@ -115,7 +115,7 @@ def _examine(
 
 
 def _rates(study: "Study | None", before: Sequence["Check"]) -> Iterator["Check"]:
-    """Yield how many pictures a second the operator's views show, of those that can be opened."""
+    """Yield the picture rates of the operator's views that can be opened."""
     from labcrane.core.findings import Verdict
     from labcrane.doctor import apart
     from labcrane.doctor.report import Check
@@ -142,7 +142,7 @@ def _print(check: "Check") -> None:
 
 
 def _session_bytes(study: "Study") -> float:
-    """Return what the longest session takes, with the same margin as ``labcrane run`` asks for."""
+    """Return the space of the longest session, with the margin that ``labcrane run`` requires."""
     from labcrane.design.plan import plan_session
     from labcrane.files.pseudonyms import pseudonyms
     from labcrane.protocol.rig import Rig

@@ -12,15 +12,17 @@ from labcrane.cli.output import out
 def compare_engines(
     protocol: ProtocolPath,
     engines: Annotated[
-        str, typer.Option(help="what to compare, with commas between")
+        str, typer.Option(help="engines to compare, separated by commas")
     ] = "bullet_crane,mujoco_crane",
-    participant: Annotated[str, typer.Option(help="pseudonym of the simulated one")] = "P001",
+    participant: Annotated[
+        str, typer.Option(help="pseudonym of the simulated participant")
+    ] = "P001",
     session: Annotated[int, typer.Option(help="which of the protocol's sessions")] = 1,
-    folder: Annotated[Path, typer.Option("--out", help="where the page goes")] = Path(
+    folder: Annotated[Path, typer.Option("--out", help="path of the page")] = Path(
         "labcrane-engines"
     ),
 ) -> None:
-    """Give one session's input to several engines, and write how far apart they get."""
+    """Run one session's input on several engines and report how far they diverge."""
     stay_on_this_computer()
     from labcrane.files import atomic
     from labcrane.replay.engines import as_html, as_markdown

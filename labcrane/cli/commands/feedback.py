@@ -18,14 +18,16 @@ def preview(
     protocol: ProtocolPath,
     folder: Annotated[
         Path | None,
-        typer.Option("--to", help="write PNG and WAV files into this folder, and show nothing"),
+        typer.Option("--to", help="write PNG and WAV files to this folder instead of showing them"),
     ] = None,
     recording: Annotated[
         Path | None,
-        typer.Option(help="participant file with the movement; a simulated one by default"),
+        typer.Option(help="participant file with the movement; by default a simulated one"),
     ] = None,
     session: Annotated[int, typer.Option(help="session of the recording")] = 1,
-    trial: Annotated[int | None, typer.Option(help="which trial; the first counted one")] = None,
+    trial: Annotated[
+        int | None, typer.Option(help="trial; by default the first counted one")
+    ] = None,
 ) -> None:
     """Play a movement in the study's windows and sounds; as files where there is no display."""
     stay_on_this_computer()
@@ -50,7 +52,7 @@ def preview(
 
 
 def _place(target: Path, recording: Path | None) -> AbstractContextManager[Path]:
-    """Return where to write: what shows somebody's movement is known to the study's register."""
+    """Return where to write; the register lists files that show a participant's movement."""
     if recording is None:
         return nullcontext(target)
     from labcrane.participants.products import files_about

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from pygls.lsp.server import LanguageServer
 
 EDITOR = "pip install 'labcrane[editor]'"
-"""How to get what speaks to editors."""
+"""How to install the language server."""
 
 _PROTOCOL = re.compile(r"^labcrane\s*:", re.MULTILINE)
 
 
 def language_server() -> None:
-    """Let an editor mark what check finds, whenever a protocol is opened or saved."""
+    """Mark what check finds in an editor, on opening and saving."""
     try:
         import pygls  # noqa: F401
     except ModuleNotFoundError as error:
@@ -31,7 +31,7 @@ def language_server() -> None:
 
 
 def findings(path: Path) -> Sequence[Mapping[str, Any]]:
-    """Return what ``check --json`` has under ``findings``."""
+    """Return ``findings`` of ``check --json``."""
     from labcrane.cli.commands.check import examined
     from labcrane.protocol.questions import about, problems
 
@@ -43,7 +43,7 @@ def findings(path: Path) -> Sequence[Mapping[str, Any]]:
 
 
 def server() -> "LanguageServer":
-    """Return a server that looks at protocols, and at no other file in YAML."""
+    """Return a server that checks protocols, and no other YAML files."""
     from importlib.metadata import version
 
     from lsprotocol import types
@@ -53,7 +53,7 @@ def server() -> "LanguageServer":
     speaks = LanguageServer("labcrane", version("labcrane"))
 
     def look(uri: str) -> None:
-        """Mark what is found in a protocol, and take away the marks of its last check."""
+        """Mark the findings in a protocol, and remove the marks of its last check."""
         path = Path(to_fs_path(uri) or "")
         if is_protocol(path):
             marks = [diagnostic(each) for each in findings(path)]
@@ -71,7 +71,7 @@ def server() -> "LanguageServer":
 
 
 def is_protocol(path: Path) -> bool:
-    """Whether a file is a protocol: it has the key ``labcrane``, or the name that they have."""
+    """Whether a file is a protocol: it has the key ``labcrane``, or a protocol's file name."""
     if path.name == "protocol.yaml":
         return True
     try:
@@ -81,7 +81,7 @@ def is_protocol(path: Path) -> bool:
 
 
 def diagnostic(finding: Mapping[str, Any]) -> "Diagnostic":
-    """Return a finding as editors are told it: from its column, or its line's first, to the end."""
+    """Return a finding for editors: from its column, or the line's first one, to the line's end."""
     from lsprotocol import types
 
     line, column = finding["line"] - 1, max(0, finding["column"] - 1)

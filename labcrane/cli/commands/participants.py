@@ -47,11 +47,11 @@ def consent(
     participant: Someone,
     beyond_planned: Annotated[
         bool,
-        typer.Option("--beyond-planned", help="enrol more than are planned, which is a deviation"),
+        typer.Option("--beyond-planned", help="enrol more than planned; recorded as a deviation"),
     ] = False,
     data: DataBeside = None,
 ) -> None:
-    """Confirm that a participant has consented to the approved text, and enrol the participant."""
+    """Confirm a participant's consent to the approved text, and enrol the participant."""
     from labcrane.approval.decision import verify
     from labcrane.participants.enrolment import confirm_consent
     from labcrane.participants.folders import Places
@@ -80,11 +80,11 @@ def exclude(
     participant: Someone,
     reason: Reason,
     keep_slot: Annotated[
-        bool, typer.Option("--keep-slot", help="do not give the slot to another one")
+        bool, typer.Option("--keep-slot", help="do not release the slot to another participant")
     ] = False,
     data: Data = HERE,
 ) -> None:
-    """Exclude a participant who dropped out or whose data are not used; the slot gets free."""
+    """Exclude a participant (dropout or unusable data) and release the slot."""
     from labcrane.participants import enrolment
     from labcrane.participants.folders import Places
 
@@ -94,10 +94,10 @@ def exclude(
 
 def note(
     participant: Someone,
-    text: Annotated[str, typer.Argument(help="what is to be remembered; no names")],
+    text: Annotated[str, typer.Argument(help="the note; no names")],
     data: Data = HERE,
 ) -> None:
-    """Keep a note on a participant."""
+    """Add a note about a participant (no names)."""
     from labcrane.participants import enrolment
     from labcrane.participants.folders import Places
 
@@ -110,7 +110,7 @@ def waive(
     session: Annotated[int, typer.Option(help="which session", min=2)],
     data: Data = HERE,
 ) -> None:
-    """Let a session be run too early or too late, which is a deviation."""
+    """Allow a session outside its time window; recorded as a deviation."""
     from labcrane.participants import enrolment
     from labcrane.participants.folders import Places
 
@@ -118,7 +118,7 @@ def waive(
 
 
 def deviations(data: Data = HERE) -> None:
-    """List what did not go as the protocol says."""
+    """List protocol deviations."""
     from labcrane.participants.deviations import all_deviations
     from labcrane.participants.folders import Places
 
@@ -134,9 +134,9 @@ def study(
     folder: Annotated[
         Path, typer.Argument(metavar="FOLDER", help="a study's folder, or the data folder in it")
     ],
-    port: Annotated[int, typer.Option(help="where it is served; 0 takes a free one")] = 0,
+    port: Annotated[int, typer.Option(help="port of the page; 0 selects a free one")] = 0,
 ) -> None:
-    """Look at a study in a browser: who is due, groups, quality, deviations, consent, disk."""
+    """Show a study in a browser: who is due, groups, quality, deviations, consent, disk."""
     from labcrane.errors import PluginError
     from labcrane.registry.offers import LAB, not_installed
     from labcrane.registry.registry import discover

@@ -1,4 +1,4 @@
-"""Commands for those who look for plugins, or write one: plugins, schema, new-plugin."""
+"""Commands for users and authors of plugins: plugins, schema, new-plugin."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,7 @@ app = typer.Typer(invoke_without_command=True)
 
 @app.callback()
 def plugins(context: typer.Context, study: OfStudy = None, as_json: AsJson = False) -> None:
-    """List what installed plugins offer; ``show NAME`` tells everything about one."""
+    """List installed plugins; ``show NAME`` describes one of their components."""
     if context.invoked_subcommand is not None:
         return
     from labcrane.registry.hookspecs import ROLES
@@ -49,7 +49,7 @@ def show(
     study: OfStudy = None,
     as_json: AsJson = False,
 ) -> None:
-    """Show settings with units and defaults, what is recorded, and an example."""
+    """Show a plugin's settings, units, defaults, recorded signals and an example."""
     from labcrane.errors import suggestion
     from labcrane.machines.library import load_machine
     from labcrane.registry.description import sheets
@@ -73,7 +73,7 @@ def schema(
         Path | None, typer.Option("--out", help="a file; the terminal by default")
     ] = None,
 ) -> None:
-    """Write the JSON Schema of protocols, with the settings of everything installed."""
+    """Write the JSON Schema of protocols, with all installed settings."""
     from labcrane.files.atomic import SHARED_FILE, write_text
     from labcrane.protocol.json_schema import protocol_schema
     from labcrane.registry.registry import discover
@@ -91,7 +91,7 @@ def new_plugin(
     name: Annotated[str, typer.Argument(help="what a protocol is to write after use:")],
     into: Annotated[Path, typer.Option(help="where the folder is made")] = Path(),
 ) -> None:
-    """Write a plugin that installs and passes its tests, for you to change."""
+    """Create a plugin that installs and passes its tests, as a starting point."""
     from labcrane.registry.registry import discover
     from labcrane.registry.scaffold import write_plugin
 

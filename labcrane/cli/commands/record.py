@@ -20,20 +20,20 @@ if TYPE_CHECKING:
 
 
 def streams(
-    wait: Annotated[float, typer.Option(help="seconds to look for", min=0.1)] = 1.5,
+    wait: Annotated[float, typer.Option(help="seconds to search", min=0.1)] = 1.5,
     watch: Annotated[
-        bool, typer.Option("--watch", help="stay, and say whether each signal is alive")
+        bool, typer.Option("--watch", help="keep running and report whether each signal is alive")
     ] = False,
     seconds: Annotated[
-        float | None, typer.Option(help="how long to watch; until Ctrl-C by default", min=0.1)
+        float | None, typer.Option(help="seconds to monitor; until Ctrl-C by default", min=0.1)
     ] = None,
     protocol: Annotated[
         Path | None,
-        typer.Option(help="whose monitors and streams to watch with", callback=protocol_in),
+        typer.Option(help="protocol whose monitors and streams are used", callback=protocol_in),
     ] = None,
     local: Local = False,
 ) -> None:
-    """List the streams on the network, or watch them."""
+    """List or monitor the LSL streams on the network."""
     if local:
         stay_on_this_computer()
     if watch:
@@ -76,7 +76,7 @@ def _watch(wait: float, seconds: float | None, protocol: Path | None) -> None:
 
 
 def _monitors(protocol: Path | None) -> "MonitorBuilder":
-    """Return what looks at signals: as a protocol has it, or all that is installed."""
+    """Return signal monitors: those of a protocol, or all that are installed."""
     from labcrane.monitoring.config import MonitorBuilder, MonitorConfig
 
     if protocol is None:
@@ -91,7 +91,7 @@ def _monitors(protocol: Path | None) -> "MonitorBuilder":
 
 
 def _show(watch: "StreamWatch", seconds: float | None) -> None:
-    """Show what is seen, again and again on a terminal, and once at the end."""
+    """Show the streams, repeatedly on a terminal, otherwise once at the end."""
     from rich.live import Live
     from rich.text import Text
 
@@ -117,7 +117,7 @@ def _show(watch: "StreamWatch", seconds: float | None) -> None:
 
 
 def record(
-    folder: Annotated[Path, typer.Argument(help="where the recording goes; must be new")],
+    folder: Annotated[Path, typer.Argument(help="folder for the recording; must be new")],
     stream: Annotated[
         list[str],
         typer.Option(
@@ -127,11 +127,11 @@ def record(
     ],
     seconds: Annotated[
         float | None,
-        typer.Option(help="how long, once all of them flow; until Ctrl-C by default", min=0.1),
+        typer.Option(help="seconds, once all streams send; until Ctrl-C by default", min=0.1),
     ] = None,
     local: Local = False,
 ) -> None:
-    """Record streams without an experiment."""
+    """Record LSL streams without running an experiment."""
     if local:
         stay_on_this_computer()
     from labcrane.recording.paths import journal_path
@@ -183,7 +183,7 @@ def _wait(recorder: "RecorderHandle", seconds: float | None) -> None:
 
 
 def _flows(status: Mapping[str, Any]) -> bool:
-    """Whether every stream that was asked for is recorded; a marker may not have come yet."""
+    """Whether every requested stream is recorded; a marker may not have come yet."""
     streams = status.get("streams", ())
     return bool(streams) and all(
         one["condition"] == "flows" or (one["condition"] == "empty" and not one["nominal_hz"])
@@ -192,9 +192,9 @@ def _flows(status: Mapping[str, Any]) -> bool:
 
 
 def recover(
-    folder: Annotated[Path, typer.Argument(help="the study's data folder, or a part of it")],
+    folder: Annotated[Path, typer.Argument(help="the study's data folder, or a folder in it")],
 ) -> None:
-    """Make participant files of whatever journals a crash left."""
+    """Rebuild participant files from the journals a crash left."""
     _recover(folder)
 
 
@@ -221,19 +221,21 @@ def _recover(folder: Path) -> None:
         out.print(f"no journals below {folder}", markup=False)
     if problems := sum(bool(each.problem) for each in found):
         raise RecordingError(
-            f"{problems} of {len(found)} sessions could not be recovered; it is said of each why: "
-            f"remove the cause, and run labcrane recover {folder} again"
+            f"{problems} of {len(found)} sessions could not be recovered (reasons "
+            f"above); fix them and run labcrane recover {folder} again"
         )
 
 
 def resync(
-    file: Annotated[Path, typer.Argument(help="a participant file, or anybody's XDF file")],
+    file: Annotated[Path, typer.Argument(help="a participant file, or any XDF file")],
     space: Annotated[
         list[str] | None,
-        typer.Option(metavar="STREAM=screen|scene", help="declare what gaze in pixels is of"),
+        typer.Option(
+            metavar="STREAM=screen|scene", help="declare whose pixels a gaze stream is in"
+        ),
     ] = None,
 ) -> None:
-    """Correct the clocks of a participant file's streams again, or those of any XDF file."""
+    """Recompute the clock corrections of a participant file, or of any XDF file."""
     if file.suffix.lower() == ".xdfz":
         raise RecordingError(
             f"{file} is packed: unpack it into an .xdf file first (gunzip -S .xdfz)"
@@ -254,7 +256,7 @@ def resync(
 
 
 def _spaces(file: Path, declared: Sequence[str]) -> dict[str, str]:
-    """Return what ``STREAM=SPACE`` says of streams that the file has."""
+    """Return the spaces that ``STREAM=SPACE`` declares for streams in the file."""
     from labcrane.analysis.gaze_streams import KIND, SCENE, SCREEN
     from labcrane.recording.participant_file.reader import open_recording
 

@@ -20,25 +20,25 @@ if TYPE_CHECKING:
 DataFolder = Annotated[Path, typer.Argument(metavar="DATA", help="the study's data folder")]
 Include = Annotated[
     list[str] | None,
-    typer.Option(help="use also: simulated, pilot, half-finished; may be repeated"),
+    typer.Option(help="also use: simulated, pilot, half-finished; may be repeated"),
 ]
 WorkersOrCores = Annotated[
     int | None,
     typer.Option(
-        help="processes on this computer; by default one a core, where people are many enough",
+        help="processes on this computer; by default one per core if there are enough participants",
         min=1,
     ),
 ]
-Scheduler = Annotated[
-    str | None, typer.Option(help="a Dask scheduler whose workers do it: tcp://host:8786")
-]
+Scheduler = Annotated[str | None, typer.Option(help="address of a Dask scheduler: tcp://host:8786")]
 AcceptUnprobed = Annotated[
     bool,
-    typer.Option("--accept-unprobed", help="use streams whose clock was never probed as well"),
+    typer.Option(
+        "--accept-unprobed", help="also use streams whose clock offset was never measured"
+    ),
 ]
 
 LEFT_OUT = 3
-"""Exit status of what was done, but without recordings that cannot be used."""
+"""Exit status if the command succeeded but left out unusable recordings."""
 
 
 def export(
@@ -49,7 +49,7 @@ def export(
             help="tables, matlab, bids, psychds, xdf, zip, lerobot, robomimic; see labcrane plugins"
         ),
     ],
-    folder: Annotated[Path, typer.Option("--out", help="a folder that is empty or new")],
+    folder: Annotated[Path, typer.Option("--out", help="an empty or new folder")],
     include: Include = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="NAME=VALUE of the exporter; may be repeated")
@@ -88,7 +88,7 @@ def export(
             try:
                 call_monitor.call(place, exporter.export, handed, made.folder)
             except LabcraneError as error:
-                if people.now is None:  # nobody's data were being read
+                if people.now is None:  # no participant's data were being read
                     raise
                 raise _Unusable(people.now, str(error)) from error
             _write_manifest(made.folder, to, chosen.model_dump(mode="json"), cohort, unknown)
@@ -99,7 +99,7 @@ def export(
 
 
 class _Unusable(Exception):  # noqa: N818 - no error: the rest is done without
-    """Somebody's data stopped what was made of everybody's."""
+    """One participant's data stopped an output for all."""
 
     def __init__(self, name: str, why: str) -> None:
         super().__init__(name, why)
@@ -107,7 +107,7 @@ class _Unusable(Exception):  # noqa: N818 - no error: the rest is done without
 
 
 class _Read:
-    """Participants as they are handed out, and whose data are being read now."""
+    """Hands out participants, and knows whose data are being read now."""
 
     def __init__(self, people: "Sequence[Participant]") -> None:
         self._people = people
@@ -122,7 +122,7 @@ class _Read:
 
 
 def _without_bad(attempt: "Callable[[Cohort], None]", cohort: "Cohort") -> "Cohort":
-    """Do something with a cohort; without whoever's data cannot be used, who is named."""
+    """Do something with a cohort; drop and name participants whose data cannot be used."""
     while True:
         try:
             attempt(cohort)
@@ -138,7 +138,7 @@ def _leave_out(cohort: "Cohort", name: str, why: str) -> "Cohort":
 
 
 def _tell_left_out(cohort: "Cohort") -> None:
-    """Say how many recordings cannot be used, and end with their exit code."""
+    """Print how many recordings cannot be used, and end with their exit code."""
     if not cohort.unreadable:
         return
     names = ", ".join(person.name for person in cohort.unreadable)
@@ -149,7 +149,7 @@ def _tell_left_out(cohort: "Cohort") -> None:
 def _measured(
     cohort: "Cohort", workers: int | None, scheduler: str | None
 ) -> "Sequence[Participant]":
-    """Return the participants; with many workers their measures, most of the work, are done."""
+    """Return the participants; several workers compute their measures first."""
     from labcrane.analysis.parallel import usual_workers, work
 
     workers = workers or usual_workers(len(cohort.included))
@@ -169,7 +169,7 @@ def _measured(
 
 def report(
     data: DataFolder,
-    folder: Annotated[Path, typer.Option("--out", help="where the report goes")] = Path(
+    folder: Annotated[Path, typer.Option("--out", help="folder for the report")] = Path(
         "labcrane-report"
     ),
     include: Include = None,
@@ -212,12 +212,12 @@ def replay(
     recording: Annotated[Path, typer.Argument(metavar="FILE", help="a participant file")],
     session: Annotated[int, typer.Option(help="which session")] = 1,
     speed: Annotated[
-        float | None, typer.Option(help="show it over LSL, so many times as fast; 1 as it was")
+        float | None, typer.Option(help="show it over LSL at this speed; 1 is the recorded speed")
     ] = None,
     show: Annotated[
-        bool, typer.Option(help="show and sound it in the study's views and sounds instead")
+        bool, typer.Option(help="present it in the study's views and sounds instead")
     ] = False,
-    begin: Annotated[float, typer.Option("--from", help="the second to show it from")] = 0.0,
+    begin: Annotated[float, typer.Option("--from", help="second to start at")] = 0.0,
     protocol: Annotated[
         Path | None,
         typer.Option(help="run this protocol instead of the recorded one", callback=protocol_in),
@@ -226,26 +226,27 @@ def replay(
         Path | None, typer.Option(help="operate this machine instead of the recorded one")
     ] = None,
     measures: Annotated[
-        Path | None, typer.Option(help="write the measures of what was replayed as CSV")
+        Path | None, typer.Option(help="write the measures of the replay as CSV")
     ] = None,
     run_recorded_code: Annotated[
         bool,
         typer.Option(
-            "--run-recorded-code", help="import plugins that are in the file: trust who made it"
+            "--run-recorded-code",
+            help="import plugins that are in the file; use it for trusted files only",
         ),
     ] = False,
 ) -> None:
-    """Run a recorded session again from its input, and compare every number."""
+    """Re-run a recorded session from its input and compare every number."""
     from labcrane.replay.replay import replay_session as run_again
 
     if speed is not None and not speed > 0.0:
-        raise ProtocolError(f"a speed of {speed:g} shows nothing; give one above 0")
+        raise ProtocolError(f"a speed of {speed:g} is not possible; give one above 0")
     if show:
         pace = 1.0 if speed is None else speed
         _show(recording, session, protocol, pace, begin, run_code=run_recorded_code)
         return
     if begin:
-        raise ProtocolError("--from is where to show it from; give --show too")
+        raise ProtocolError("--from needs --show; add it")
     if speed is not None:
         stay_on_this_computer()
     done = run_again(
@@ -267,7 +268,7 @@ def replay(
     raise RecordingError(
         f"tick {first.tick} is the first that differs: {first.column} was {first.recorded!r} and "
         f"is {first.replayed!r}"
-        + ("" if done.parts else "; no part that is recorded differs, so look at the plugins")
+        + ("" if done.parts else "; no recorded part differs, so check the plugins")
     )
 
 
@@ -300,18 +301,18 @@ def view(
     ],
     session: Annotated[int, typer.Option(help="which session")] = 1,
     beside: Annotated[
-        Path | None, typer.Option(help="another participant file, shown at the same second")
+        Path | None, typer.Option(help="another participant file, shown in parallel")
     ] = None,
-    at: Annotated[float, typer.Option(help="the second to begin at")] = 0.0,
+    at: Annotated[float, typer.Option(help="second to start at")] = 0.0,
     trial: Annotated[
-        int | None, typer.Option(help="begin at this trial instead; its number in the trial table")
+        int | None, typer.Option(help="start at this trial, by its number in the trial table")
     ] = None,
     beside_trial: Annotated[
-        int | None, typer.Option(help="show this trial beside it, both from their starts")
+        int | None, typer.Option(help="also show this trial; both run from their starts")
     ] = None,
-    port: Annotated[int, typer.Option(help="where it is served; 0 takes a free one")] = 0,
+    port: Annotated[int, typer.Option(help="port of the page; 0 selects a free one")] = 0,
 ) -> None:
-    """Look at a recorded session in a browser: machine, time line, signals, events."""
+    """Show a recorded session in a browser: machine, timeline, signals, events."""
     from tempfile import TemporaryDirectory
 
     from labcrane.registry.offers import LAB, not_installed
@@ -332,7 +333,7 @@ def view(
         out.print(line, markup=False)
 
     if beside_trial is not None and trial is None:
-        raise ProtocolError("--beside-trial is put beside a trial; give --trial too")
+        raise ProtocolError("--beside-trial needs --trial; add it")
     paths = [recording, *([beside or recording] if beside or beside_trial is not None else [])]
     with TemporaryDirectory(prefix="labcrane-view-") as scratch:
         films = [
@@ -366,7 +367,7 @@ def _write_measures(recording: Path, session: int, frames: "Groups", path: Path)
 
 
 def cohort_of(data: Path, include: list[str] | None) -> "Cohort":
-    """Return who counts in a study's data folder, and print who does not, and why."""
+    """Return the included participants of a data folder, and print the others with reasons."""
     from labcrane.analysis.cohort import find_cohort
     from labcrane.participants.folders import Places
     from labcrane.participants.register import struck
@@ -386,9 +387,9 @@ def _product(
     shared: Sequence[str] = (),
     whole: bool = False,
 ) -> "AbstractContextManager[Product]":
-    """Return a folder to write into that the register knows; see :mod:`~.participants.products`.
+    """Return an output folder that the register knows; see :mod:`~.participants.products`.
 
-    Those who were left out are listed in it, with the reason.
+    It lists the participants who were left out, with reasons.
     """
     from labcrane.analysis.cohort import Status
     from labcrane.participants.products import product
@@ -433,7 +434,7 @@ def _settings(model: Any, words: list[str], name: str) -> Any:
     for word in words:
         key, separator, value = word.partition("=")
         if not separator:
-            raise ProtocolError(f"--set {word!r} sets nothing; write NAME=VALUE")
+            raise ProtocolError(f"--set {word!r} is not an assignment; write NAME=VALUE")
         given[key] = parse_yaml(value, f"--set {key}")
     try:
         return model.model_validate(given)
@@ -448,9 +449,9 @@ def _settings(model: Any, words: list[str], name: str) -> Any:
 def _write_manifest(
     folder: Path, to: str, settings: Any, cohort: "Cohort", unprobed: list[str]
 ) -> None:
-    """Write what was exported and who was left out beside the export, for erasure and for readers.
+    """Write an export's contents and left-out participants next to it, for erasure and readers.
 
-    BIDS and Psych-DS allow no further files, so it is hidden from them under ``.labcrane``.
+    BIDS and Psych-DS do not allow further files, so they are hidden under ``.labcrane``.
     """
     from datetime import UTC, datetime
 

@@ -19,7 +19,7 @@ SessionNumber = Annotated[int, typer.Option(help="which of the protocol's sessio
 Simulate = Annotated[
     bool, typer.Option("--simulate", help="a simulated operator takes the controls")
 ]
-Pilot = Annotated[bool, typer.Option("--pilot", help="a trial run: its files are stamped PILOT")]
+Pilot = Annotated[bool, typer.Option("--pilot", help="a pilot session; its files are named PILOT")]
 Page = Annotated[
     bool | None,
     typer.Option("--page/--no-page", help="the pages in the browser; on unless --simulate"),
@@ -34,7 +34,7 @@ WithFeedback = Annotated[
 
 RealTime = Annotated[
     bool,
-    typer.Option("--real-time", help="the loop before all other programs, on a core of its own"),
+    typer.Option("--real-time", help="give the loop priority and its own core"),
 ]
 
 
@@ -45,7 +45,7 @@ def run(
     data: DataBeside = None,
     simulate: Simulate = False,
     fast: Annotated[
-        bool, typer.Option("--fast", help="with --simulate: as fast as the machine can, no LSL")
+        bool, typer.Option("--fast", help="with --simulate: as fast as possible, no LSL")
     ] = False,
     pilot: Pilot = False,
     local: Local = False,
@@ -55,9 +55,9 @@ def run(
 ) -> None:
     """Run a session of a study."""
     if fast and not simulate:
-        raise ProtocolError("--fast needs --simulate: people cannot be hurried")
+        raise ProtocolError("--fast needs --simulate; add it, or drop --fast")
     if fast and real_time:
-        raise ProtocolError("--fast has no real time to keep; leave out one of --fast, --real-time")
+        raise ProtocolError("--fast and --real-time cannot be combined; drop one")
     from labcrane.session.visit import visit_of
 
     visit = visit_of(
@@ -85,7 +85,7 @@ def resume(
     data: DataBeside = None,
     policy: Annotated[
         Literal["continue", "redo_trial", "redo_block"] | None,
-        typer.Option(help="where to go on; as the protocol says by default"),
+        typer.Option(help="where to continue; the protocol's policy by default"),
     ] = None,
     simulate: Simulate = False,
     pilot: Pilot = False,
@@ -94,7 +94,7 @@ def resume(
     feedback: WithFeedback = None,
     real_time: RealTime = False,
 ) -> None:
-    """Go on with a session that stopped: do what it still owes."""
+    """Continue an interrupted session and complete what remains."""
     from labcrane.session.visit import visit_of
 
     folder = data_folder(data, protocol)
@@ -114,19 +114,19 @@ def resume(
         real_time=real_time,
     )
     if visit.study.outdated:
-        out.print("gone on with as it was begun; a new session would be refused:", markup=False)
+        out.print("continued as it was begun; a new session would be refused:", markup=False)
         out.print(visit.study.outdated, markup=False)
     _launch(visit, page=not simulate if page is None else page)
 
 
 ENGINES = ("mujoco_crane", "kinematic_crane")
-"""What can move the demo's crane, the best one first. The last needs nothing but labcrane."""
+"""Engines for the demo's crane, the best one first. The last needs only labcrane."""
 
 
 def demo(
-    data: Annotated[Path, typer.Option(help="where the recording goes")] = Path("labcrane-demo"),
+    data: Annotated[Path, typer.Option(help="folder for the recording")] = Path("labcrane-demo"),
 ) -> None:
-    """Run a shortened aiming study with a simulated operator, on MuJoCo where it is installed."""
+    """Run a shortened aiming study with a simulated operator, on the best installed engine."""
     stay_on_this_computer()
     from tempfile import TemporaryDirectory
 
@@ -153,7 +153,7 @@ def demo(
 
 
 def _best_engine() -> tuple[str, dict[str, str]]:
-    """Return the best engine that is installed, and what each of the better ones lacks."""
+    """Return the best installed engine, and why each better one is unavailable."""
     from labcrane.core.roles import Dynamics
     from labcrane.registry.registry import discover
 
@@ -167,7 +167,7 @@ def _best_engine() -> tuple[str, dict[str, str]]:
 
 
 def _demo_on(engine: str, folder: Path) -> Path:
-    """Write the demo's protocol with this engine: a recording tells which one it was made with."""
+    """Write the demo's protocol with this engine: recordings name their engine."""
     from importlib.resources import files
 
     text = (files("labcrane.cli") / "demo.yaml").read_text(encoding="utf-8")
@@ -177,7 +177,7 @@ def _demo_on(engine: str, folder: Path) -> Path:
 
 
 def _check(visit: "Visit") -> None:
-    """Make sure that a visit can be run, before anything is shown of it."""
+    """Make sure that a session can be run, before anything of it is shown."""
     from labcrane.session.session import check_free
     from labcrane.session.visit import check_new
 
@@ -224,7 +224,7 @@ def _launch(visit: "Visit", *, page: bool) -> None:
     keys, asked = not visit.simulated, visit.study.questionnaires
     shown, counts = out.console, TrialCounts.of(plan)
     with (
-        # Before any other process is started: they are to leave that core alone.
+        # Before any other process is started: they must not use that core.
         reserved_core() if visit.real_time else nullcontext() as core,
         Terminal(console, shown, counts, keys=keys, questionnaires=asked) as terminal,
     ):
@@ -242,12 +242,12 @@ def _launch(visit: "Visit", *, page: bool) -> None:
         print_report(outcome.sync_report)
     if visit.folder.participant_file.exists():
         out.print(f"participant file: {visit.folder.participant_file}", markup=False)
-    again = f"go on with: {visit.resume_command}"
+    again = f"to continue, run: {visit.resume_command}"
     if outcome.owed:
-        out.print(f"the session is not complete: {outcome.owed}; {again}", markup=False)
+        out.print(f"the session is incomplete: {outcome.owed}; {again}", markup=False)
     if outcome.died is not None:
         raise LabcraneError(
             f"the session process died with exit code {outcome.died}"
-            f"{f' in {outcome.where}' if outcome.where else ''}; what it recorded is in the "
+            f"{f' in {outcome.where}' if outcome.where else ''}; its recording is in the "
             f"participant file; {again}"
         )

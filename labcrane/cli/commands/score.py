@@ -26,10 +26,10 @@ def score(
         typer.Option(help="YAML with weights, reading, mistakes, capped; as recorded by default"),
     ] = None,
     include: Annotated[
-        list[str] | None, typer.Option(help="use also: simulated, pilot; may be repeated")
+        list[str] | None, typer.Option(help="also use: simulated, pilot; may be repeated")
     ] = None,
 ) -> None:
-    """Write the evaluation workbook: performance indicator, trend, what to practise next."""
+    """Write the evaluation workbook: performance indicator, trend, recommended practice."""
     from rich.table import Table
 
     from labcrane.analysis.cohort import kinds_of
@@ -40,8 +40,8 @@ def score(
     path = into or folder / "evaluation.xlsx"
     if path.suffix != ".xlsx":
         raise LabcraneError(
-            f"--out {path} is no name of a workbook; give one that ends in .xlsx, its tests are "
-            "written beside it as .csv"
+            f"--out {path} is not a workbook; give a name that ends in .xlsx; the tests go into a "
+            ".csv file in the same folder"
         )
     # Operators are scored while they are still in training.
     cohort = cohort_of(folder, [HALF_FINISHED, *(include or ())])

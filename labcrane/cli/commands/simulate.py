@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 CohortPath = Annotated[
     Path | None,
-    typer.Option(help="how operators differ; cohort.yaml beside the protocol if there is one"),
+    typer.Option(help="how operators differ; by default cohort.yaml in the protocol's folder"),
 ]
 
 
@@ -40,15 +40,16 @@ def simulate(
     protocol: ProtocolPath,
     folder: Annotated[Path, typer.Option("--out", help="the simulated study's data folder")],
     participants: Annotated[
-        int | None, typer.Option(help="how many; as many as are planned by default", min=1)
+        int | None,
+        typer.Option(help="number of participants; the planned number by default", min=1),
     ] = None,
     cohort: CohortPath = None,
     workers: WorkersOrCores = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """Run a whole study with simulated operators, as fast as it goes.
+    """Run a whole study with simulated operators, as fast as possible.
 
-    Participants who are in the folder already are kept: what was interrupted goes on.
+    Participants who are in the folder already are kept: an interrupted run continues.
     """
     from labcrane.files.pseudonyms import pseudonyms
     from labcrane.protocol.study import load
@@ -69,7 +70,7 @@ def simulate_all(
     workers: int | None,
     scheduler: str | None,
 ) -> None:
-    """Simulate whoever is not in ``folder`` yet, and say how far it is."""
+    """Simulate the participants who are not in ``folder`` yet, and report progress."""
     from labcrane.simulation.simulation import simulate_study
 
     orders = _orders(protocol, folder, names, cohort)
@@ -80,8 +81,8 @@ def simulate_all(
     except KeyboardInterrupt:
         there = sum(order.folder.path.exists() for order in orders)
         out.print(
-            f"interrupted: {there} of {len(orders)} participants are in {folder}, whole; the same "
-            "command makes the others",
+            f"interrupted: {there} of {len(orders)} participants are complete in {folder}; run the "
+            "same command to simulate the others",
             markup=False,
         )
         raise
@@ -90,14 +91,14 @@ def simulate_all(
 def _orders(
     protocol: Path, folder: Path, names: "Sequence[str]", cohort: Path | None
 ) -> "list[SimulationJob]":
-    """Return whom to simulate, and say by which operators."""
+    """Return the participants to simulate, and print which operators are used."""
     from labcrane.files.names import COHORT
     from labcrane.simulation.simulation import SimulationJob
 
     stay_on_this_computer()
     beside = protocol.resolve().with_name(COHORT)
     cohort = cohort or (beside if beside.exists() else None)
-    out.print(f"operators: {cohort or 'all alike but for their seeds'}", markup=False)
+    out.print(f"operators: {cohort or 'identical except for their seeds'}", markup=False)
     # Workers may be in another folder than we are.
     place = folder.resolve()
     of = cohort.resolve() if cohort else None
@@ -105,7 +106,7 @@ def _orders(
 
 
 POOL_TIMES = 5
-"""How many times the largest cohort are simulated to draw from."""
+"""Size of the simulated pool, in multiples of the largest cohort."""
 
 
 def power(
@@ -113,7 +114,7 @@ def power(
     folder: Annotated[Path, typer.Option("--out", help="for the pool, the table and the plot")],
     participants: Annotated[str, typer.Option(help="sizes of the cohort")] = "12,24,36,48",
     effect: Annotated[
-        str, typer.Option(help="what is tested: MEASURE~FACTOR; =SIZE puts an effect in")
+        str, typer.Option(help="the test: MEASURE~FACTOR; =SIZE imposes an effect")
     ] = "movement_time~sequence",
     test: Annotated[
         str,
@@ -121,34 +122,36 @@ def power(
     ] = "t",
     pool: Annotated[
         int | None,
-        typer.Option(help="participants to draw cohorts from; five times the largest", min=3),
+        typer.Option(
+            help="size of the pool to sample from; by default five times the largest", min=3
+        ),
     ] = None,
     recordings: Annotated[
         Path | None,
-        typer.Option(help="draw from the participants of this data folder, and simulate nobody"),
+        typer.Option(help="sample from the participants in this data folder; no simulation"),
     ] = None,
     include: Include = None,
-    cohorts: Annotated[int, typer.Option(help="cohorts drawn for each size", min=20)] = 1000,
+    cohorts: Annotated[int, typer.Option(help="cohorts sampled for each size", min=20)] = 1000,
     resimulate: Annotated[
-        int | None, typer.Option(help="simulate so many cohorts afresh and draw none", min=2)
+        int | None, typer.Option(help="simulate this many new cohorts instead of sampling", min=2)
     ] = None,
     claim: Annotated[
-        str, typer.Option(help="what is to be shown: difference, equivalence or non_inferiority")
+        str, typer.Option(help="hypothesis: difference, equivalence or non_inferiority")
     ] = "difference",
     margin: Annotated[
-        float, typer.Option(help="of equivalence or non-inferiority, in the effect's unit")
+        float, typer.Option(help="margin of equivalence or non-inferiority, in the effect's unit")
     ] = 0.0,
     goal: Annotated[
-        str, typer.Option(help="powers for which the smallest cohort is searched: 0.8,0.9")
+        str, typer.Option(help="find the smallest cohort for these powers: 0.8,0.9")
     ] = "",
     cohort: CohortPath = None,
     workers: WorkersOrCores = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """Find out how many participants the planned test needs, from simulated or recorded ones.
+    """Estimate the planned test's power and sample size, from simulated or recorded participants.
 
     Without --test it is a t test of the participants' slopes, or differences, against zero; Welch's
-    between groups. With labels permuted it says how often something is found where nothing is.
+    between groups. With permuted labels it estimates the rate of false positives.
     """
     from labcrane.analysis.quality import is_result
     from labcrane.errors import ProtocolError
@@ -162,8 +165,8 @@ def power(
     study = load(protocol, discover(study=protocol))
     if resimulate is not None and (recordings is not None or test != "t"):
         raise ProtocolError(
-            "--resimulate makes fresh participants for the t test; leave it out with --recordings, "
-            "and with --test"
+            "--resimulate is for the t test of new participants; it cannot be combined with "
+            "--recordings or --test; drop it"
         )
     kind = _kind(test)
     if recordings is not None:
@@ -193,7 +196,7 @@ def power(
 def _written(
     folder: Path, recordings: Path | None, people: "Mapping[str, str]"
 ) -> "Iterator[Path]":
-    """Hand out the folder to write into; what is drawn from recordings is people's, and kept."""
+    """Hand out the output folder; output from recordings is personal data, and is registered."""
     from labcrane.cli.commands.approval import today
     from labcrane.files.atomic import make_folder
     from labcrane.participants.products import product
@@ -208,7 +211,7 @@ def _written(
 
 @dataclass(frozen=True)
 class _Everyone:
-    """Whom cohorts are drawn from: their movements, and everybody's group, also without any."""
+    """The pool of cohorts: movements, and the group of everyone, even without movements."""
 
     movements: "pd.DataFrame"
     people: "Mapping[str, str]"
@@ -216,7 +219,7 @@ class _Everyone:
 
 @dataclass(frozen=True)
 class _Drawn:
-    """How cohorts are drawn, what is to be shown of them, and where the files are in the end."""
+    """How cohorts are sampled, the tested claim, and the final place of the files."""
 
     study: str
     sizes: "Sequence[int]"
@@ -227,7 +230,7 @@ class _Drawn:
 
 
 def _kind(test: str) -> "Kind | None":
-    """Return which of the report's tests is meant; None for the t test."""
+    """Return the requested test of the report; None for the t test."""
     from typing import cast, get_args
 
     from labcrane.errors import ProtocolError, suggestion
@@ -235,7 +238,7 @@ def _kind(test: str) -> "Kind | None":
 
     kinds = ("t", *get_args(Kind))
     if test not in kinds:
-        raise ProtocolError(f"--test {test!r} is no test; {suggestion(test, kinds)}")
+        raise ProtocolError(f"--test {test!r} is not a test; {suggestion(test, kinds)}")
     return None if test == "t" else cast("Kind", test)
 
 
@@ -278,7 +281,7 @@ def _simulated(
 def _recorded(
     folder: Path, include: "list[str] | None", workers: int | None, scheduler: str | None
 ) -> _Everyone:
-    """Return everybody who counts in a data folder."""
+    """Return the included participants of a data folder."""
     cohort = cohort_of(folder.resolve() if scheduler else folder, include)
     people = {each.name: str(each.context.get("group", "")) for each in cohort.included}
     return _measured(cohort.included, people, workers, scheduler)
@@ -333,7 +336,7 @@ def _claim(kind: str, margin: float) -> "Claim":
 
     kinds = get_args(get_type_hints(Claim)["kind"])
     if kind not in kinds:
-        raise ProtocolError(f"--claim {kind!r} is nothing to be shown; {suggestion(kind, kinds)}")
+        raise ProtocolError(f"--claim {kind!r} is not a hypothesis; {suggestion(kind, kinds)}")
     return Claim(cast("Any", kind), margin)
 
 
@@ -343,7 +346,7 @@ def _goals(text: str) -> list[float]:
     try:
         return [float(word) for word in text.split(",") if word]
     except ValueError:
-        raise ProtocolError(f"--goal {text!r} is no list of powers; write 0.8,0.9") from None
+        raise ProtocolError(f"--goal {text!r} is not a list of powers; write 0.8,0.9") from None
 
 
 def _search(
@@ -381,7 +384,7 @@ def _sizes(text: str) -> list[int]:
         sizes = []
     if not sizes or sizes[0] < 3:  # noqa: PLR2004 - a t test with fewer says nothing
         raise ProtocolError(
-            f"--participants {text!r} is no list of sizes of 3 or more; write 12,24,36"
+            f"--participants {text!r} is not a list of sizes of 3 or more; write 12,24,36"
         )
     return sizes
 
@@ -415,15 +418,15 @@ def _measured(
 
 
 def _together(tables: "Sequence[pd.DataFrame]", people: "Mapping[str, str]") -> _Everyone:
-    """Return everybody's movements in one table, and say who has none."""
+    """Return all movements in one table, and print who has none."""
     import pandas as pd
 
     everything = pd.concat(tables, ignore_index=True)
     there = set() if everything.empty else set(everything["participant"])
     if missing := [name for name in people if name not in there]:
         out.print(
-            f"without a movement that counts: {', '.join(missing)}; they are drawn as the others "
-            "are, and are in no test",
+            f"without a counted movement: {', '.join(missing)}; they are sampled like the "
+            "others, but are in no test",
             markup=False,
         )
     if not everything.empty:
@@ -439,11 +442,11 @@ def _print_power(
     from labcrane.simulation.power import power as power_of
 
     pool = make_pool(everyone.movements, tested, everyone.people)
-    there = set(everyone.movements["participant"])  # the others were told of before
+    there = set(everyone.movements["participant"])  # the others were reported before
     if left_out := [name for name in pool.left_out if name in there]:
         out.print(
-            f"without a value at some level: {', '.join(left_out)}; they are drawn as the "
-            "others are, and left out of the test",
+            f"without a value at some level: {', '.join(left_out)}; they are sampled like "
+            "the others, but left out of the test",
             markup=False,
         )
     seed = derive(by.study, "power")
@@ -484,16 +487,16 @@ def _write_power(folder: Path, found: "Sequence[Power]", by: _Drawn) -> None:
 def tracks(
     protocol: ProtocolPath,
     folder: Annotated[Path, typer.Option("--out", help="for the tables and the plot")],
-    operators: Annotated[int, typer.Option(help="how many simulated operators", min=20)] = 1000,
+    operators: Annotated[int, typer.Option(help="number of simulated operators", min=20)] = 1000,
     spread: Annotated[
         list[float] | None,
         typer.Option(help="how steeply success falls with the level; QUEST+ has its own"),
     ] = None,
 ) -> None:
-    """Find out how well adaptive levels find thresholds, from operators whose thresholds are known.
+    """Measure how well adaptive levels estimate known thresholds of simulated operators.
 
-    Every track is led through its block by simulated operators; bias and spread of its estimates
-    are told, in the unit of its levels.
+    Simulated operators complete every track's block; the command prints bias and spread of its
+    estimates, in the unit of its levels.
     """
     from dataclasses import asdict
 
@@ -514,10 +517,10 @@ def tracks(
     planned = _planned_tracks(study, name)
     if not planned:
         raise ProtocolError(
-            f"no block of {protocol} has a track; docs/protocol.md says how levels are chosen"
+            f"no block of {protocol} has a track; docs/protocol.md explains how levels are chosen"
         )
     if wrong := [each for each in spread or () if not each > 0.0]:
-        raise ProtocolError(f"--spread {wrong[0]:g} is no spread; give numbers above 0")
+        raise ProtocolError(f"--spread {wrong[0]:g} is not a spread; give numbers above 0")
     table = whole_table(
         "track", "operators", "bias", "95 %", "lowest tenth", "highest tenth", "spread",
         "bias / spread", "trials",

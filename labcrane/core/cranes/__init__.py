@@ -1,5 +1,5 @@
-"""Cranes: what a crane that follows speed commands is, in whatever engine.
+"""Cranes that follow speed commands, in any engine.
 
-In come settings and a machine; out go the base classes of the cranes that plugins move, with their
-drives, their loads and their compiled twins.
+Input: settings and a machine. Output: the base classes of the cranes that plugins move, with their
+drives, their loads and their compiled kernels.
 """

@@ -21,12 +21,12 @@ from labcrane.types import FloatArray
 ROUNDING_S = 1e-9
 
 ENGINE_DEVIATION = 1e-9
-"""By how much angles and speeds of a compiled twin may differ from an engine's, in rad and rad/s:
-it rounds otherwise, by some 1e-14."""
+"""Tolerance between angles and speeds of a compiled kernel and an engine's, in rad and rad/s: it
+rounds differently, by some 1e-14."""
 
 
 def crane_signals(machine: Machine) -> tuple[Signal, ...]:
-    """Return what a crane's state holds, in order."""
+    """Return the signals of a crane's state, in order."""
     return (
         Signal("joint.angle", "rad", machine.names),
         Signal("joint.velocity", "rad/s", machine.names),
@@ -36,10 +36,10 @@ def crane_signals(machine: Machine) -> tuple[Signal, ...]:
 
 
 def drive_signals(machine: Machine) -> tuple[Signal, ...]:
-    """Return what the state of a crane with drives of limited torque holds besides.
+    """Return the further signals of a crane's state with drives of limited torque.
 
     ``joint.load`` is the drive's torque as a share of the joint's effort, with its sign;
-    ``joint.saturated`` is 1 or -1 where it gives all that it has, by its direction, and else 0.
+    ``joint.saturated`` is 1 or -1 at its limit, by its direction, and else 0.
     """
     return (
         Signal("joint.load", "1", machine.names),
@@ -50,8 +50,8 @@ def drive_signals(machine: Machine) -> tuple[Signal, ...]:
 class Crane(Dynamics):
     """A crane whose joints follow speed commands through their actuators.
 
-    What moves them is a subclass: it says how to stand at angles (``_place``) and how joints move
-    for one tick at given speeds (``_move``). A speed holds over its tick.
+    A subclass moves them: it sets angles (``_place``) and moves joints for one tick at given
+    speeds (``_move``). A speed holds over its tick.
 
     Parameters
     ----------
@@ -108,19 +108,19 @@ class Crane(Dynamics):
         return {f"actuator.{name}": value for name, value in actuator.items()}
 
     def law_twin(self) -> Twin:
-        """Return the twin of a crane that follows the velocity law in every tick.
+        """Return the kernel of a crane that follows the velocity law in every tick.
 
-        Its :meth:`_stand` and :meth:`_motion` put it where its twin came, and say where it is.
+        Its :meth:`_stand` and :meth:`_motion` set and return its state for the kernel.
         """
         from labcrane.core.cranes.compiled_crane import step  # noqa: PLC0415 - loads numba
 
         return self._twin_of(step)
 
     def engine_twin(self) -> Twin | None:
-        """Return the twin of a crane in an engine, for ticks in which all drives have the torque.
+        """Return the kernel of a crane in an engine, for ticks in which all drives have the torque.
 
-        All others are the engine's. None for a crane that is not made of beams on the slew axis,
-        whose equations it has not.
+        All other ticks are the engine's. None for a crane that is not made of beams on the slew
+        axis: the kernel does not have its equations.
         """
         slew, *_ = joints = self._machine.joints
         if slew.a or any(joint.inertia_kgm2 or joint.centre_m for joint in joints):
@@ -130,10 +130,10 @@ class Crane(Dynamics):
         return self._twin_of(step_engine, links_of(self._machine), ENGINE_DEVIATION)
 
     def _twin_of(self, step: object, further: Sequence[float] = (), deviation: float = 0.0) -> Twin:
-        """Return the twin for a compiled ``step``.
+        """Return the kernel for a compiled ``step``.
 
-        It is told the numbers of the machine and of its actuator, ``further`` ones, then angles,
-        speeds, the actuator's speeds and commands on their way, which it keeps up to date.
+        It is given the numbers of the machine and of its actuator, ``further`` ones, then angles,
+        speeds, the actuator's speeds and pending commands, which it keeps up to date.
         """
         joints, actuator = self._machine.joints, self._actuator
         ideal, share, *most = actuator.constants
@@ -160,16 +160,16 @@ class Crane(Dynamics):
         self._stand(values[:joints].tolist(), values[joints : 2 * joints].tolist())
 
     def _motion(self) -> tuple[Sequence[float], Sequence[float]]:
-        """Return where the joints are in rad, and how they move in rad/s, for a twin."""
+        """Return the joints' angles in rad and speeds in rad/s, for a kernel."""
         joints, values = len(self._machine.joints), self._state.values.tolist()
         return values[:joints], values[joints : 2 * joints]
 
     def _stand(self, angles: Sequence[float], speeds: Sequence[float]) -> None:
-        """Go on from ``angles`` in rad, moving at ``speeds`` in rad/s, to where a twin came."""
+        """Continue from ``angles`` in rad and ``speeds`` in rad/s, the end of a kernel's ticks."""
 
     @abstractmethod
     def _place(self, angles: Sequence[float]) -> None:
-        """Stand at ``angles`` in rad, as if nothing had happened before."""
+        """Set ``angles`` in rad, at rest, without any history."""
 
     @abstractmethod
     def _move(self, speeds: Sequence[float]) -> FloatArray:

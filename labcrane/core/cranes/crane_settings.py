@@ -26,7 +26,7 @@ class CraneSettings(Settings):
         late = drive.dead_time_s + drive.lag_s
         if late <= LONGEST_LAG_S:
             return {}
-        return {"actuator": f"follows {late:g} s late: nobody steers such a crane"}
+        return {"actuator": f"follows {late:g} s late: such a crane cannot be steered"}
 
 
 class GrappleSettings(Settings):
@@ -64,12 +64,12 @@ class LoadedCraneSettings(CraneSettings):
         strongest = max(joint.effort for joint in machine.joints)
         if self.grapple and self.grapple.length_m > reach:
             found["grapple.length_m"] = (
-                f"is {self.grapple.length_m:g} m, and the crane itself reaches {reach:.3g} m"
+                f"is {self.grapple.length_m:g} m, but the crane itself reaches only {reach:.3g} m"
             )
         if self.hanging_kg * GRAVITY * reach / 2 > strongest:
             found["payload_kg"] = (
-                f"is {self.payload_kg:g} kg, and with it what hangs there needs "
-                f"{self.hanging_kg * GRAVITY * reach / 2:.3g} N m at half of the reach, where the "
+                f"is {self.payload_kg:g} kg; with it the hanging load needs "
+                f"{self.hanging_kg * GRAVITY * reach / 2:.3g} N m at half of the reach, but the "
                 f"strongest joint has {strongest:.3g}"
             )
         return found

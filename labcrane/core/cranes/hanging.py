@@ -40,7 +40,7 @@ class HangingLoad:
     signals
         What the state holds, in order.
     values
-        The state, shape ``(n_state,)``, filled anew on every tick.
+        The state, shape ``(n_state,)``, filled again on every tick.
     """
 
     def __init__(
