@@ -5,7 +5,7 @@ LabcraneError
 ├── PluginError      a plugin is missing, broken, or broke its contract
 ├── DeviceError      hardware is absent or stopped answering
 ├── StreamError      LSL is set up wrongly, or a stream is missing or broken
-└── RecordingError   a file cannot be written, or is not what it should be
+└── RecordingError   a file cannot be written, or has unexpected content
 
 A late tick is not an error: it is data, and is recorded with the frame.
 """
@@ -18,13 +18,13 @@ class LabcraneError(Exception):
 
 
 class ProtocolError(LabcraneError):
-    """The study protocol, or what was asked of it, cannot be run as written.
+    """The study protocol, or a request about it, cannot be run as written.
 
     Parameters
     ----------
     at
-        The keys and indices, below what is being read or built, that lead to what is wrong: a check
-        points there, ``at=("distances", 2)``.
+        The keys and indices that lead to the mistake, counted from the part being read or built:
+        ``at=("distances", 2)``. A check points there.
     """
 
     def __init__(self, message: str = "", *, at: Sequence[str | int] = ()) -> None:

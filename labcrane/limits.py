@@ -1,8 +1,8 @@
 """Limits of everything that enters from outside: one table, and the checks that keep to it.
 
-A limit is kept at the door, in the process of whoever sends, before a pipe or the loop is reached.
-Every check takes time that grows no faster than what it is given. docs/security.md prints the
-table; a test compares the two.
+Limits are enforced in the sender's process, before the input reaches a pipe or the loop. The time
+of every check grows at most linearly with its input. docs/security.md prints the table; a test
+compares the two.
 """
 
 import json
@@ -13,12 +13,12 @@ from typing import Any
 
 
 class LimitError(ValueError):
-    """Something from outside is larger, deeper or of another alphabet than may enter."""
+    """An input from outside is too large, nested too deep, or contains a refused character."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """What one kind of input may be.
+    """The limits of one kind of input.
 
     Attributes
     ----------
@@ -27,11 +27,11 @@ class Limit:
     depth
         How deep lists and mappings in it may be nested; 0 where nothing can be.
     alphabet
-        What it may be made of, in words.
+        The allowed characters or content, in words.
     door
-        The module that checks it, and so the process: that of the sender.
+        The module that checks it, in the sender's process.
     otherwise
-        What becomes of what is refused.
+        What happens to refused input.
     """
 
     most: int
@@ -162,8 +162,8 @@ LIMITS: Mapping[str, Limit] = {
 }
 """By kind of input."""
 
-# Everything that a page, a terminal, XML or JSON shows otherwise than it is: control characters but
-# tab and line ends, halves of surrogates, noncharacters, and what turns the direction of writing.
+# Every character that a page, a terminal, XML or JSON may show wrongly: control characters except
+# tab and line ends, halves of surrogates, noncharacters, and marks that turn the direction.
 _FOREIGN = re.compile(
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
 )
@@ -185,42 +185,42 @@ def check_text(text: str, kind: str) -> None:
     check_size(len(text), kind, f"the {kind}")
     if (sign := foreign(text)) is not None:
         raise LimitError(
-            f"the {kind} holds the character U+{ord(sign):04X}, which is no writing; leave it out"
+            f"the {kind} contains the character U+{ord(sign):04X}, which is not allowed; remove it"
         )
     if kind == "setting" and (found := _SETTING.search(text)):
         raise LimitError(
-            f"the setting holds {found[0]!r}; it is one plain value in one line: name.key=value"
+            f"the setting contains {found[0]!r}; write one plain value in one line: name.key=value"
         )
 
 
 def foreign(text: str) -> str | None:
-    """Return the first character in ``text`` that is no writing; None where there is none."""
+    """Return the first character in ``text`` that is not allowed; None if all are."""
     found = _FOREIGN.search(text)
     return found[0] if found else None
 
 
 def read_json(text: str, kind: str) -> Any:
-    """Return what a text of JSON holds.
+    """Return the content of a JSON text.
 
     Raises
     ------
     LimitError
-        It is too long, nested too deep, of another alphabet, or no JSON.
+        It is too long, nested too deep, contains a refused character, or is not valid JSON.
     """
     check_text(text, kind)
     most = LIMITS[kind].depth
-    # What has so few brackets cannot be nested deeper: the loop need not look at every sign.
+    # A text with so few brackets cannot be nested deeper: the loop can be skipped.
     if text.count("[") + text.count("{") > most and _deepest(text) > most:
         raise LimitError(f"the {kind} is nested deeper than {most} levels; write it flat")
     try:
         # Whole numbers as floats: Python refuses more than 4,300 digits.
         return json.loads(text, parse_int=_number)
     except (ValueError, RecursionError) as error:
-        raise LimitError(f"the {kind} is no JSON: {error}") from error
+        raise LimitError(f"the {kind} is not valid JSON: {error}") from error
 
 
 def _number(digits: str) -> float | int:
-    """Return a whole number; as a float when it is larger than any that is asked for."""
+    """Return a whole number; as a float when it has 20 digits or more."""
     return int(digits) if len(digits) < 20 else float(digits)  # noqa: PLR2004 - 64 bits
 
 

@@ -107,8 +107,8 @@ def test_settings_are_a_name_or_written_out() -> None:
         ("x", "no actuator is called 'x'; there is ideal, electric, hydraulic, sluggish"),
         (
             3,
-            "3 is no actuator; write a name (ideal, electric, hydraulic, sluggish) or a mapping "
-            "of dead_time_s, lag_s, rate_limit",
+            "3 is not an actuator; write a name (ideal, electric, hydraulic, sluggish) or a "
+            "mapping of dead_time_s, lag_s, rate_limit",
         ),
     ],
 )

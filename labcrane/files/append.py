@@ -26,9 +26,9 @@ REMEDIES = {
 class AppendFile:
     """A new file, opened for appending and for nothing else.
 
-    A block is handed to the operating system in one call, so it survives whatever happens to this
-    process. A thread brings it to the disk at least once in ``sync_s`` seconds. Not for use by
-    several threads at once: whoever owns it keeps the order.
+    A block is handed to the operating system in one call, so it survives a crash of this process.
+    A thread brings it to the disk at least once in ``sync_s`` seconds. It is not thread-safe: its
+    owner keeps the calls in order.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ class Truth(str):
 
 
 class WrongKey(ValueError):  # noqa: N818 - no error of labcrane's, but a complaint about a key
-    """What a validator of several keys says of one of them: a check points there.
+    """A complaint of a validator of several keys about one of them: a check points there.
 
     Parameters
     ----------
@@ -72,9 +72,9 @@ class Complaint:
 def told(
     errors: Sequence[ErrorDetails], place: Place, model: type[BaseModel]
 ) -> Iterator[Complaint]:
-    """Yield what pydantic complains of; where a value is no member of a union, in one line.
+    """Yield the complaints of pydantic; one for a value that fits no member of a union.
 
-    Pydantic complains once for every member, each as if it were the only one.
+    Pydantic itself complains once for every member, each as if it were the only one.
     """
     unions: dict[Place, list[ErrorDetails]] = {}
     inside: set[Place] = set()
@@ -153,7 +153,7 @@ def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:
         return f"{named((*place, *loc[:-1]))} needs {str(key)!r}"
     name = named((*place, *(step for step in loc if not is_member(step))))
     if isinstance(error["input"], Truth):
-        return f"{name}: {error['input']} is no number; write one"
+        return f"{name}: {error['input']} is not a number; write one"
     if isinstance(error["input"], Unread):
         return f"{name}: {error['input'].why}"
     what = error["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
@@ -283,14 +283,14 @@ def _no_key(key: str, model: type[BaseModel], place: Place, loc: Place) -> str:
 
 
 def field_at(model: type[BaseModel], loc: Place) -> FieldInfo | None:
-    """Return the field of the last key of a place; None where it is no model's."""
+    """Return the field of the last key of a place; None if no model has that key."""
     keys = [at for at, step in enumerate(loc) if isinstance(step, str) and not is_member(step)]
     holder = _model_at(model, loc[: keys[-1]]) if keys else None
     return holder.model_fields.get(str(loc[keys[-1]])) if holder else None
 
 
 def _model_at(model: type[BaseModel], place: Place) -> type[BaseModel] | None:
-    """Return the model that describes what stands at a place; None where it is no model's."""
+    """Return the model that describes the value at a place; None if no model does."""
     at: Any = model
     for step in place:
         if not is_member(step):
@@ -299,7 +299,7 @@ def _model_at(model: type[BaseModel], place: Place) -> type[BaseModel] | None:
 
 
 def _under(annotation: Any, step: str | int) -> Iterator[Any]:
-    """Yield the annotations of what stands under a key of something, or is its item."""
+    """Yield the annotations of the value under a key, or of an item of a list."""
     if hasattr(annotation, "__metadata__"):
         annotation = annotation.__origin__
     origin, arguments = get_origin(annotation), get_args(annotation)

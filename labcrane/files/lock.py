@@ -13,12 +13,12 @@ from labcrane.errors import RecordingError
 from labcrane.files.atomic import PRIVATE_FILE, make_folder
 
 LOOK_S = 0.05
-"""How often a lock that somebody else holds is tried again."""
+"""Interval at which a lock that another process holds is tried again, in seconds."""
 
 
 @contextmanager
 def exclusive(path: Path) -> Iterator[None]:
-    """Hold the lock file ``path``; wait for whoever holds it."""
+    """Hold the lock file ``path``; wait while another process holds it."""
     make_folder(path.parent)
     fd = _opened(path)
     try:
@@ -30,19 +30,19 @@ def exclusive(path: Path) -> Iterator[None]:
 
 @contextmanager
 def held(path: Path, refusal: str, patience_s: float = 0.0) -> Iterator[None]:
-    """Hold the lock file ``path``, in a folder that is there; the lock dies with the process.
+    """Hold the lock file ``path`` in an existing folder; the lock ends with the process.
 
     Parameters
     ----------
     refusal
-        What to say when another process holds it; its number is added.
+        The message when another process holds it; the number of that process is added.
     patience_s
         How long to wait for that process, in seconds.
 
     Raises
     ------
     RecordingError
-        Another process holds it still.
+        Another process still holds it.
     """
     deadline = time.monotonic() + patience_s
     while (fd := _locked(path)) is None:
@@ -55,10 +55,10 @@ def held(path: Path, refusal: str, patience_s: float = 0.0) -> Iterator[None]:
         yield
     finally:
         if sys.platform != "win32":
-            path.unlink(missing_ok=True)  # while it is held, so that nobody else's is removed
+            path.unlink(missing_ok=True)  # while held: the lock of another process stays
         os.close(fd)
         if sys.platform == "win32":
-            with suppress(OSError):  # somebody holds it by now
+            with suppress(OSError):  # another process may hold it by now
                 path.unlink()
 
 
@@ -80,20 +80,20 @@ def _opened(path: Path) -> int:
         raise RecordingError(NO_LOCK.format(path, error.strerror)) from error
     if not stat.S_ISREG(os.fstat(fd).st_mode):
         os.close(fd)
-        raise RecordingError(NO_LOCK.format(path, "it is no file"))
+        raise RecordingError(NO_LOCK.format(path, "it is not a file"))
     return fd
 
 
-NO_LOCK = "{} cannot be used as a lock: {}; remove it, and do it again"
+NO_LOCK = "{} cannot be used as a lock: {}; remove it, then try again"
 
 
 def _locked(path: Path) -> int | None:
-    """Return an open file with the lock on it; None when somebody else has it."""
+    """Return an open file with the lock on it; None when another process has it."""
     fd = _opened(path)
     if not _lock(fd, wait=False):
         os.close(fd)
         return None
-    if not _is_at(path, fd):  # whoever held it has removed it meanwhile
+    if not _is_at(path, fd):  # its former holder has removed it meanwhile
         os.close(fd)
         return _locked(path)
     return fd

@@ -1,6 +1,6 @@
-"""Reasons why a text is no YAML, in the words of those who write one, and where it went wrong.
+"""Reasons why a text is not valid YAML, in plain words, and the places of the mistakes.
 
-A parser notices a mistake where it can go on no more, which is often a line later.
+A parser notices a mistake where it cannot continue, which is often a line later.
 """
 
 import re
@@ -15,8 +15,8 @@ from ruamel.yaml.tokens import ScalarToken
 GARBLED = (
     YAMLError, ValueError, LookupError, TypeError, ArithmeticError, AttributeError, AssertionError
 )  # fmt: skip
-"""What ruamel.yaml raises of a text that is no YAML, or of values that are not what they look like:
-it does not say what, and these were seen."""
+"""Exceptions of ruamel.yaml for invalid YAML and for values that do not fit their tag. Its
+documentation does not list them; these were observed."""
 
 _WIDE = re.compile(r"[ \t]*[\u00a0\u2000-\u200b\u202f\u3000]")
 _NO_SPACE = re.compile(r"\s*(?:- +)?([A-Za-z_][\w-]*):([^\s/].*)?$")
@@ -47,7 +47,8 @@ def misread(error: MarkedYAMLError, text: str) -> tuple[Spot, str]:
     if found := _DUPLICATE.search(problem):
         first = error.context_mark.line + 1 if error.context_mark else line
         return (line, column), (
-            f"the key {found['key']!r} is there twice in what begins in line {first}; keep one"
+            f"the key {found['key']!r} is listed twice in the mapping that begins in line {first}; "
+            "keep one"
         )
     if "flow" in context and error.context_mark and not problem.startswith("found undefined"):
         opened, sign = _opened(text, error.context_mark.index)
@@ -116,37 +117,38 @@ def _without_space(lines: list[str], line: int) -> tuple[Spot, str] | None:
 SAID = {
     "mapping values are not allowed": "a second colon, or too much indentation; put text with a "
     "colon into quotation marks, and begin keys of one level in one column",
-    "could not find expected ':'": "a line that is no key with its value; write key: value",
-    "expected <block end>": "a line that begins in another column than those beside it; begin keys "
+    "could not find expected ':'": "a line that is not a key with a value; write key: value",
+    "expected <block end>": "a line that begins in another column than its neighbours; begin keys "
     "and dashes of one level in one column",
     "expected a single document": "a second document behind ---; write one file for each",
     "but found another document": "a second document behind ---; write one file for each",
-    "found undefined alias": "{problem}, whose anchor, &, is nowhere before it; write what it "
-    "stands for",
-    "expected a mapping node": "a tag that asks for keys with values, before none; remove it",
-    "expected a sequence": "a tag that asks for a list, before none; remove it",
-    "unknown escape character": "a backslash in double quotation marks begins a sign of its own; "
-    "write single ones: 'P\\d{3}'",
-    "for merging": "<<: takes what an anchor names, as <<: *base, and nothing else; write keys out",
+    "found undefined alias": "{problem}, which has no anchor (&) before it; write the value itself",
+    "expected a mapping node": "a tag that requires keys with values, before none; remove it",
+    "expected a sequence": "a tag that requires a list, before none; remove it",
+    "unknown escape character": "a backslash in double quotation marks starts an escape sequence; "
+    "use single quotation marks: 'P\\d{3}'",
+    "for merging": "<<: accepts only an alias, as in <<: *base; write the keys out instead",
     "while scanning a quoted": "a quotation mark that is not closed; close it",
     "found unexpected end of stream": "a quotation mark that is not closed; close it",
-    "cannot start any token": "a sign that cannot begin a value; put it into quotation marks",
-    "expected the node content": "a value is missing, or one comma is too many; write the value",
+    "cannot start any token": "a character that cannot begin a value; put it in quotation marks",
+    "expected the node content": "a value is missing, or there is an extra comma; write the value",
     "expected <document start>": "a line that is neither a key nor a comment; write key: value",
     "expected '<document start>'": "a line that is neither a key nor a comment; write key: value",
 }
-"""What a parser says, and what it means to whoever wrote the line."""
+"""Messages of the parser, and what they mean for the author of the line."""
 
 
 def _plain(problem: str) -> str:
     for said, meant in SAID.items():
         if said in problem:
-            return f"this is no YAML: {meant.replace('{problem}', problem)}"
-    return f"this is no YAML: {problem}; look at indentation, colons and brackets here and above"
+            return f"this is not valid YAML: {meant.replace('{problem}', problem)}"
+    return (
+        f"this is not valid YAML: {problem}; check indentation, colons and brackets here and above"
+    )
 
 
 TAGS = {"int": "a whole number", "float": "a number", "bool": "true or false", "null": "nothing"}
-"""What a tag of YAML asks for."""
+"""The values that tags of YAML require."""
 
 _TAG = "tag:yaml.org,2002:"
 
@@ -160,7 +162,7 @@ def unreadable(text: str, error: Exception) -> str:
     if (found := _first_unlike(text)) is not None:
         (line, column), why = found
         return f":{line}:{column}: {why}"
-    return f": this is no YAML: {str(error) or repr(error)}"
+    return f": this is not valid YAML: {str(error) or repr(error)}"
 
 
 def _first_unlike(text: str) -> tuple[Spot, str] | None:
@@ -181,13 +183,13 @@ def _unlike(node: ScalarNode) -> str:
     kind = str(node.tag).removeprefix(_TAG)
     if kind == "timestamp":
         return (
-            f"this is no YAML: {node.value!r} looks like a date or a time, and there is none such; "
-            "write one that is, or put it into quotation marks"
+            f"this is not valid YAML: {node.value!r} looks like a date or a time but is not one; "
+            "correct it, or put it in quotation marks"
         )
     asked = TAGS.get(kind, "something else")
     return (
-        f"this is no YAML: the tag !!{kind} asks for {asked}, which {node.value!r} is not; remove "
-        "the tag"
+        f"this is not valid YAML: the tag !!{kind} requires {asked}, which {node.value!r} is not; "
+        "remove the tag"
     )
 
 

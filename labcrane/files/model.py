@@ -96,9 +96,9 @@ def _docstrings(of: type) -> Iterator[tuple[str, str]]:
 
 
 def _no_truth(annotation: Any, value: Any) -> Any:
-    """Refuse ``true`` where a number is asked for: it would be taken for 1.
+    """Refuse ``true`` where a number is required: it would be read as 1.
 
-    It becomes what is no number, so that it is refused at its own place, in a list as well.
+    It becomes a :class:`Truth`, so that it is refused at its own place, in a list as well.
     """
     while hasattr(annotation, "__metadata__"):
         annotation = get_args(annotation)[0]
@@ -108,7 +108,7 @@ def _no_truth(annotation: Any, value: Any) -> Any:
         if kinds & {int, float} and not kinds & {bool, Any}:
             if str not in kinds:
                 return Truth(str(value).lower())
-            raise ValueError(f"{str(value).lower()} is no number; write one")
+            raise ValueError(f"{str(value).lower()} is not a number; write one")
     elif isinstance(value, list | dict) and origin in {Union, UnionType}:
         for one in arguments:  # one of them, at most, is of this kind
             value = _no_truth(one, value)
@@ -149,9 +149,9 @@ def number_at(model: type[BaseModel], place: Sequence[str | int]) -> tuple[str |
 def was_run(info: ValidationInfo) -> bool:
     """Return whether what is validated is the record of a session that was run.
 
-    A validator that only judges, and changes nothing, asks this first and lets a record pass: it
-    was accepted by the rules of its day, and by rules that came later it would be lost to replay
-    and to whoever goes on with the session.
+    A validator that only checks, and changes nothing, asks this first and lets a record pass. The
+    record was accepted by the rules of its time; later rules must not make it unusable for replay
+    and for continuing the session.
 
     Examples
     --------
@@ -162,7 +162,7 @@ def was_run(info: ValidationInfo) -> bool:
     ...     @classmethod
     ...     def _differ(cls, colours: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
     ...         if not was_run(info) and len(set(colours)) < len(colours):
-    ...             raise ValueError("a colour is there twice")
+    ...             raise ValueError("a colour is listed twice")
     ...         return colours
     """
     return bool(info.context and info.context.get("recorded"))

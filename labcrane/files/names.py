@@ -63,7 +63,7 @@ OURS = frozenset(
         "false",
     ]
 )
-"""Folders, files and words of our own records: nobody can be called that."""
+"""Folders, files and words of our own records: not allowed as pseudonyms."""
 
 DEVICES = frozenset(
     ["con", "prn", "aux", "nul", "conin", "conout", "clock"]
@@ -77,7 +77,7 @@ MISSING = frozenset(
         "#N/A", "#N/A N/A", "-1.#IND", "1.#IND", "-1.#QNAN", "1.#QNAN",
     }
 )  # fmt: skip
-"""Words that pandas, R or BIDS read as a missing value unless they are told otherwise."""
+"""Words that pandas, R or BIDS read as a missing value by default."""
 
 HASHED = 8
 

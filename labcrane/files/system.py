@@ -11,8 +11,9 @@ BINARY: int = getattr(os, "O_BINARY", 0)
 PRIVATE_MODES = sys.platform != "win32"
 """Whether permissions of a file keep others from reading it.
 
-Windows knows one of them, whether it may be written. There the folder's access list decides, which
-new files and folders take over: of a folder in the user's profile nobody else has one.
+Windows has only one such permission: whether the file may be written. The access list of the folder
+decides there, and new files and folders inherit it. In the user's profile it admits nobody but the
+user.
 """
 
 

@@ -19,11 +19,12 @@ def read_csv_text(path: Path) -> str:
     OSError
         It cannot be read.
     ValueError
-        It is larger than a table may be, no UTF-8, or damaged where it is packed; says which.
+        The file is too large for a table, not UTF-8, or a damaged gzip file; the message says
+        which.
     """
     most = LIMITS["CSV table"].most
     if not is_file(path):
-        raise LimitError("it is no file")
+        raise LimitError("it is not a file")
     check_size(path.stat().st_size, "CSV table", "it")
     with path.open("rb") as file:
         packed = file.read(len(PACKED)) == PACKED
@@ -39,9 +40,9 @@ def read_csv_text(path: Path) -> str:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise LimitError(
-            f"byte 0x{content[error.start]:02X} in line {line} is no UTF-8; save it as UTF-8"
+            f"byte 0x{content[error.start]:02X} in line {line} is not UTF-8; save it as UTF-8"
         ) from error
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
-        raise LimitError(f"line {line} holds a NUL, which no table does")
+        raise LimitError(f"line {line} contains a NUL character; remove it")
     return text

@@ -125,7 +125,8 @@ def in_unit(text: str, unit: str) -> float | None:
     if unit == "s" and (clock := _CLOCK.fullmatch(text)):
         seconds = 60 * int(clock[1]) + int(clock[2])
         raise ValueError(
-            f"{text!r} is no number of seconds; write {seconds} for {text} minutes, or {seconds} s"
+            f"{text!r} is not a number of seconds; write {seconds} for {text} minutes, or "
+            f"{seconds} s"
         )
     if _SEVERAL.fullmatch(text):  # 1 min 30 s
         return float(f"{sum(in_unit(part, unit) or 0.0 for part in _PART.findall(text)):.12g}")

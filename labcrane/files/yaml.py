@@ -26,10 +26,10 @@ from labcrane.limits import LIMITS, LimitError, check_size, foreign
 
 DEEPEST = LIMITS["YAML file"].depth
 MOST_MARKS = 20_000
-"""Marks of YAML in a file: they, more than its length, are what reading it takes time for."""
+"""Marks of YAML in a file: they, more than its length, determine how long reading takes."""
 
 MOST_VALUES = 50_000
-"""Values in a file once every alias stands for what it names."""
+"""Values in a file once every alias is replaced by its anchor's value."""
 
 MOST_BITS = 1000
 """Of a whole number: Python writes down no more than 4,300 digits."""
@@ -45,9 +45,9 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 
 @dataclass
 class YamlFile:
-    """One file's content, and what is wrong with it.
+    """The content of one file, and its mistakes.
 
-    Mistakes are collected, so that all of them are told at once by :meth:`raise_problems`.
+    Mistakes are collected, so that :meth:`raise_problems` reports all of them at once.
 
     Attributes
     ----------
@@ -111,10 +111,10 @@ class YamlFile:
         self._problems += [(line, column, each) for each in message.splitlines()]
 
     def uneven_commas(self) -> Iterator[tuple[Place, str]]:
-        """Yield where numbers of a list are apart by commas with and without a space.
+        """Yield the places of lists whose commas have a space in some cases only.
 
-        That is the place of the list, and the first two numbers without a space, as they are
-        written: ``1,5``, which whoever writes decimals with a comma means as one.
+        With each place comes the first pair of numbers without a space, as written: ``1,5``,
+        which may be meant as one number with a decimal comma.
         """
         yield from _uneven_commas(self._marked, (), self.text.split("\n"))
 
@@ -269,7 +269,7 @@ def read_text(path: Path) -> str:
     try:
         check_size(path.stat().st_size, "YAML file", "it")
         if not path.is_file():
-            raise ProtocolError(f"{path} is no file; give a YAML file")
+            raise ProtocolError(f"{path} is not a file; give the path of a YAML file")
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise ProtocolError(
@@ -284,13 +284,13 @@ def read_text(path: Path) -> str:
                 raise ProtocolError(f"{path} is {what}; {AS_TEXT}") from None
         if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
             raise ProtocolError(
-                f"{path}:1:1: byte 0x{raw[0]:02X} is no UTF-8; the file is in UTF-16: open it in "
+                f"{path}:1:1: byte 0x{raw[0]:02X} is not UTF-8; the file is in UTF-16: open it in "
                 "an editor and save it as UTF-8"
             ) from None
         at = _place_in(raw[: error.start].decode())
         raise ProtocolError(
-            f"{path}:{at}: byte 0x{raw[error.start]:02X} is no UTF-8; open the file in an editor "
-            "and save it as UTF-8"
+            f"{path}:{at}: byte 0x{raw[error.start]:02X} is not UTF-8; open the file in an "
+            "editor and save it as UTF-8"
         ) from None
     except (OSError, ValueError) as error:  # a path with a NUL
         raise ProtocolError(f"{path} cannot be read: {error}") from error
@@ -305,7 +305,7 @@ def read_yaml(path: Path) -> Any:
     Raises
     ------
     ProtocolError
-        As :func:`read_text`, or the text is no YAML.
+        As :func:`read_text`, or the text is not valid YAML.
     """
     return parse_yaml(read_text(path), str(path))
 
@@ -318,25 +318,25 @@ def parse_yaml(text: str, name: str, *, recorded: bool = False) -> Any:
     name
         What the text is, for the message when it is none.
     recorded
-        Whether it is part of a record: characters that are no writing, and anchors given twice,
-        were once let in.
+        Whether it is part of a record: earlier versions allowed characters that are refused now,
+        and anchors that are defined twice.
 
     Raises
     ------
     ProtocolError
-        It is no YAML, or longer, deeper or larger behind its aliases than may be.
+        It is not valid YAML, or exceeds the limits of length, depth or number of values.
     """
     return _plain(_load(text, name, recorded=recorded), name, recorded=recorded)
 
 
-class _Misfit(Exception):  # noqa: N818 - it is told as an error of the protocol
-    """A value that no file may hold, and the line and column of what holds it, where known."""
+class _Misfit(Exception):  # noqa: N818 - it is reported as an error of the protocol
+    """A value that no file may contain, and the line and column of its container, where known."""
 
     at: str | None = None
 
 
 def _check_key(node: Any, key: Any, others: Mapping[str, Any]) -> None:
-    """Refuse a key that is no name, or becomes one that is there: of two, one would be lost."""
+    """Refuse a key that is not a name, or that equals another key once it is a text."""
     if key is None or isinstance(key, Mapping | list | tuple):
         what = "nothing" if key is None else "a mapping or a list"
         why = f"has {what} for a key; write a name, in quotation marks if it is one"
@@ -394,11 +394,11 @@ def _load(text: str, name: str, *, recorded: bool = False) -> Any:
             warnings.simplefilter("ignore" if recorded else "error", ReusedAnchorWarning)
             return YAML(typ="rt", pure=True).load(text)
     except ReusedAnchorWarning as error:
-        # The second of the two places that it tells.
+        # The second of the two places in the message.
         where = ":".join(re.findall(r"line (\d+), column (\d+)", str(error))[-1])
         raise ProtocolError(
-            f"{name}:{where}: this is no YAML that can be trusted: an anchor is given twice; give "
-            "each its own name"
+            f"{name}:{where}: this is not valid YAML: an anchor is defined twice; give each anchor "
+            "its own name"
         ) from error
     except MarkedYAMLError as error:
         (line, column), why = misread(error, text)
@@ -410,8 +410,8 @@ def _load(text: str, name: str, *, recorded: bool = False) -> Any:
                 "save it as UTF-8"
             ) from error
         raise ProtocolError(
-            f"{name}:{_place_in(text[: error.position])}: this is no YAML: it holds the character "
-            f"U+{_code(error):04X}, which no text may; remove it"
+            f"{name}:{_place_in(text[: error.position])}: this is not valid YAML: it contains the "
+            f"character U+{_code(error):04X}, which is not allowed; remove it"
         ) from error
     except RecursionError:
         raise ProtocolError(

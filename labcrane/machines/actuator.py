@@ -50,8 +50,8 @@ class ActuatorSettings(StrictModel):
             message = f"no actuator is called {value!r}; {suggestion(value, ACTUATOR_PRESETS)}"
             raise ValueError(message)  # noqa: TRY004 - pydantic reports no TypeError
         raise ValueError(
-            f"{written(value)} is no actuator; write a name ({', '.join(ACTUATOR_PRESETS)}) or a "
-            f"mapping of {', '.join(cls.model_fields)}"
+            f"{written(value)} is not an actuator; write a name ({', '.join(ACTUATOR_PRESETS)}) or "
+            f"a mapping of {', '.join(cls.model_fields)}"
         )
 
 

@@ -24,7 +24,7 @@ def reach(machine: Machine, point: Sequence[float]) -> tuple[float, ...] | None:
     """
     arm = Arm(machine)
     bearing = math.atan2(point[1], point[0] - machine.base_x) - machine.joints[0].offset
-    spread = random.Random(0)  # noqa: S311 - where to look first is no secret
+    spread = random.Random(0)  # noqa: S311 - start values need no cryptography
     for start in range(STARTS):
         chain = (
             machine.rest[1:]

@@ -37,8 +37,8 @@ RANGES: dict[str, tuple[tuple[Point, float, float, float], ...]] = {
 }
 """Axis, lowest and highest angle in degrees, and friction in N m of each hinge, in their order from
 the body outward; "left" is outward for a right limb too. Angles count from straight along the body.
-They are rounded from what is usual of grown people, and the friction is assumed: that of somebody
-who does not hold the limb."""
+The angles are rounded from typical values of adults. The friction is an assumption: that of a
+person who does not hold the limb."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -163,7 +163,7 @@ class Machine(StrictModel):
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A box that moves with a joint, for whoever draws the machine.
+    """A box that moves with a joint, for renderers of the machine.
 
     Attributes
     ----------

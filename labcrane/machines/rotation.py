@@ -10,8 +10,8 @@ from labcrane.types import FloatArray
 def rotation_matrix(quaternion: Iterable[float]) -> FloatArray:
     """Return the rotation of a unit quaternion x, y, z, w, shape ``(3, 3)``.
 
-    Its numbers are bare ones in [-1, 1]. What is no unit quaternion gives a matrix all the same: a
-    state may hold such for a moment.
+    The numbers have no unit and are in [-1, 1]. Other quaternions give a matrix too, without an
+    error: a state may contain them for a moment.
     """
     x, y, z, w = map(float, quaternion)
     return np.array(

@@ -105,7 +105,7 @@ class SceneObject(StrictModel):
         Raises
         ------
         ProtocolError
-            It cannot be read, or is no part.
+            It cannot be read, or is not a part.
         """
         if self.use is not None:
             self._part = load_part(self.use)
@@ -196,10 +196,10 @@ class PlacedObject:
     mass, friction, slip
         In kg, 1, N.
     limits
-        Largest force in N by part; a part without one may be pressed as one likes.
+        Largest force in N by part; the force on other parts is not limited.
     ground
-        Largest force in N, beyond its own weight, with which a part of somebody jointed may meet
-        what they lie on; by part.
+        Largest force in N, beyond its own weight, between a part of an articulated figure and the
+        ground under it; by part.
     deformed
         The part that is deformed, if any.
     jointed
@@ -284,7 +284,7 @@ def _check_goals(scene: Scene, source: YamlFile) -> None:
 
 
 def place_objects(scene: Scene, seed: int) -> tuple[PlacedObject, ...]:
-    """Return where everything stands in a trial with this seed; the same seed, the same places."""
+    """Return the positions of all objects in a trial; they depend on this seed alone."""
     random = np.random.default_rng([seed, 0x5CE])
     placed = [_placed(name, thing, random) for name, thing in scene.things.items()]
     if scene.figure is not None:

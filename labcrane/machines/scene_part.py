@@ -72,11 +72,11 @@ class PartShape(StrictModel):
         from labcrane.machines.meshes.solids import read_solids  # noqa: PLC0415
 
         if self.mesh is None or self.points or any(self.size):
-            raise ValueError("a mesh that is touched has its file under mesh, no size, no points")
+            raise ValueError("a mesh for contact has its file under mesh, and no size or points")
         if self.mesh.file.suffix.lower() != ".obj":
             raise ValueError(
-                f"{self.mesh.file.name!r} is no OBJ file, which a mesh that is touched must be: as "
-                "text it is kept with every recording"
+                f"{self.mesh.file.name!r} is not an OBJ file; a mesh for contact must be one, "
+                "because every recording contains it as text"
             )
         self._solids = tuple(
             tuple((float(x), float(y), float(z)) for x, y, z in corners)
@@ -133,7 +133,7 @@ class Part(StrictModel):
     """Whether it is an obstacle, which nothing moves."""
 
     carries: bool = False
-    """Whether somebody may lie on it: what rests on it is no hit against it."""
+    """Whether a figure may lie on it: resting on it is not counted as a hit."""
 
     mass_kg: PositiveFloat = 1.0
     """Its mass, in kilograms; an obstacle's does not matter."""

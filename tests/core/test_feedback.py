@@ -150,7 +150,7 @@ def test_a_changed_setting_is_an_event(tmp_path: Path) -> None:
         ("bell.far=1", "there is no feedback 'bell'; there is ball, tone"),
         ("tone.fat=1", "tone has no setting 'fat'; it has far, "),
         ("tone.far=-1", "tone.far cannot be -1: Input should be greater than 0"),
-        ("tone.far=[1, 2]", "the setting holds '['; it is one plain value in one line"),
+        ("tone.far=[1, 2]", "the setting contains '['; write one plain value in one line"),
     ],
 )
 def test_a_setting_that_cannot_be_is_refused(text: str, why: str, tmp_path: Path) -> None:

@@ -277,7 +277,7 @@ def test_an_axis_that_the_device_does_not_have_is_told(complaint) -> None:
     [
         ("", "1: it must be a mapping of keys, beginning with 'labcrane: 1'"),
         ("a: [1, 2", "1:4: '[' opens here and is not closed"),
-        ("a: 1\na: 2\n", "2:1: the key 'a' is there twice in what begins in line 1; keep one"),
+        ("a: 1\na: 2\n", "2:1: the key 'a' is listed twice in the mapping that begins in line 1; keep one"),
     ],
 )  # fmt: skip
 def test_what_is_no_protocol_is_told(

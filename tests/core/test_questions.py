@@ -492,7 +492,7 @@ def test_a_quantity_is_read_in_the_unit_that_is_asked_for(
         ("30 %", "deg", "where an angle is asked for"),
         ("3 foos", "s", "has no unit that is known, where a time is asked for"),
         ("1,5 m", "m", "write decimals with a point: 1.5 m"),
-        ("1:30", "s", "is no number of seconds; write 90"),
+        ("1:30", "s", "is not a number of seconds; write 90"),
         ("9 m**9**9**9", "m", "has no unit that is known"),
     ],
 )  # fmt: skip
@@ -531,7 +531,7 @@ def test_a_wrong_unit_is_told_with_its_line(tmp_path: Path) -> None:
 
 
 def test_a_truth_is_no_number_unless_it_was_recorded_as_one(tmp_path: Path) -> None:
-    with pytest.raises(ProtocolError, match=r"movements: true is no number; write one"):
+    with pytest.raises(ProtocolError, match=r"movements: true is not a number; write one"):
         a_study(tmp_path, ("movements: 2", "movements: true"))
     path = tmp_path / "study.yaml"
     assert load(path, discover(), recorded=True).tasks

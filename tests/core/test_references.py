@@ -77,7 +77,7 @@ def told(tmp_path: Path, registry: Registry):
         ("aiming", "camera: cab", "font: arial.ttf", "27:31: views.operator.font is 'arial.ttf', and there is no such file;"),
         ("aiming", "camera: cab", "keys: [a, lft]", "27:35: views.operator.keys[2] is 'lft', and there is no such key; did you mean 'lshift'?"),
         ("aiming", "input: {use: dual_joystick}", "input: {use: keyboard, view: operator, axes: {slew: [a, d]}}", "11:54: input.axes.slew[1] is 'a', and there is no such key of that view; it has none"),
-        ("retrieval", "look: [0.8, ", "look: [true, ", "38:56: views.operator.camera.look[1]: true is no number; write one"),
+        ("retrieval", "look: [0.8, ", "look: [true, ", "38:56: views.operator.camera.look[1]: true is not a number; write one"),
         ("aiming", "camera: cab", "areas: [targt]", "27:33: views.operator.areas[1] is 'targt', and there is no such object; did you mean 'target'?"),
         ("aiming", "camera: cab", "patch: {on: [trial.strat]}", "27:38: views.operator.patch.on[1] is 'trial.strat', and there is no such event; did you mean 'trial.start'?"),
         ("aiming", "camera: cab", "supervisor: {cameras: [moon]}", "27:48: views.operator.supervisor.cameras[1] is 'moon', and there is no such camera;"),
@@ -95,7 +95,7 @@ def told(tmp_path: Path, registry: Registry):
         ("retrieval", "model: arm.dmd.yaml\n  prop", "model: avc.dbc\n  prop", "16:10: "),
         ("retrieval", "jaws: {grip_n: 60", "jaws: {joint: boom, grip_n: 60", "18:17: the jaws' joint 'boom' must be the machine's last and have length 0, but the last is 'jaws'"),
         ("retrieval", "proportional: [base]", "proportional: [base, base]", "17:24: dynamics.proportional has 'base' twice; write it once"),
-        ("aiming", "pattern: 'P\\d{3}'", 'pattern: "P\\d{3}"', "7:28: this is no YAML: a backslash in double quotation marks begins a sign of its own; write single ones: 'P\\d{3}'"),
+        ("aiming", "pattern: 'P\\d{3}'", 'pattern: "P\\d{3}"', "7:28: this is not valid YAML: a backslash in double quotation marks starts an escape sequence; use single ones: 'P\\d{3}'"),
         ("aiming", "  map:", "\tmap:", "14:1: there is a tab, which YAML does not take for indentation; write spaces"),
     ],
 )  # fmt: skip
@@ -327,7 +327,7 @@ def test_a_file_in_another_encoding_is_told_to_be_saved_as_utf_8(
 ) -> None:
     path = tmp_path / "study.yaml"
     path.write_bytes("labcrane: 1\ntitle: Übung\n".encode("latin-1"))
-    said = r"study\.yaml:2:8: byte 0xDC is no UTF-8; .* save it as"
+    said = r"study\.yaml:2:8: byte 0xDC is not UTF-8; .* save it as"
     with pytest.raises(ProtocolError, match=said):
         load(path, registry)
 

@@ -201,23 +201,23 @@ WRONG = {
     "half": (changed("accessors", 0, "count", to=2.5), r"accessors\.0\.count"),
     "offset": (changed("accessors", 0, "byteOffset", to=HUGE), "values beyond its buffer view"),
     "view": (changed("bufferViews", 0, "byteLength", to=HUGE), "beyond its buffer"),
-    "no view": (changed("accessors", 0, "bufferView", to=9), "names buffer view 9, and has 1"),
-    "no mesh": (changed("nodes", 0, "mesh", to=7), "names mesh 7, and has 1"),
+    "no view": (changed("accessors", 0, "bufferView", to=9), "refers to buffer view 9, but has 1"),
+    "no mesh": (changed("nodes", 0, "mesh", to=7), "refers to mesh 7, but has 1"),
     "circle": (changed("nodes", to=[{"children": [1]}, {"children": [2]}, {"children": [1]}]),
                "node 1 twice"),
     "itself": (changed("scenes", to=[{"nodes": [0, 0]}]), "node 0 twice"),
     "draco": (changed("extensionsRequired", to=["KHR_draco_mesh_compression"]), "needs the ext"),
     "old": (changed("asset", "version", to="1.0"), r"asset\.version"),
-    "nowhere": (changed("nodes", 0, "scale", to=[1e300, 1e300, 1e300]), "nowhere"),
+    "nowhere": (changed("nodes", 0, "scale", to=[1e300, 1e300, 1e300]), "position is not"),
     "no turn": (changed("nodes", 0, "rotation", to=[0, 0, 0, 0]), "rotation is none"),
-    "outside": (changed("buffers", 0, "uri", to="../secret.bin"), "no file beside it or below"),
-    "password": (changed("buffers", 0, "uri", to="/etc/passwd"), "no file beside it or below"),
-    "network": (changed("buffers", 0, "uri", to="http://x.org/a"), "must be in files beside it"),
-    "linked": (changed("buffers", 0, "uri", to="linked.bin"), "no file beside it or below"),
-    "long": (changed("buffers", 0, "uri", to="a" * 5000), "no file beside it or below"),
+    "outside": (changed("buffers", 0, "uri", to="../secret.bin"), "not a file next to it or below"),
+    "password": (changed("buffers", 0, "uri", to="/etc/passwd"), "not a file next to it or below"),
+    "network": (changed("buffers", 0, "uri", to="http://x.org/a"), "must be in files next to it"),
+    "linked": (changed("buffers", 0, "uri", to="linked.bin"), "not a file next to it or below"),
+    "long": (changed("buffers", 0, "uri", to="a" * 5000), "not a file next to it or below"),
     "commas": (changed("extras", to=[0] * 1_000_000), "too large"),
-    "text": (changed("buffers", 0, "uri", to="data:;base64,@@@@"), "no base64"),
-    "points": (changed("accessors", 0, "componentType", to=5125), "other values than points"),
+    "text": (changed("buffers", 0, "uri", to="data:;base64,@@@@"), "not base64"),
+    "points": (changed("accessors", 0, "componentType", to=5125), "that are not points"),
     "sparse": (changed("accessors", 0, "sparse", to={}), "sparse"),
 }  # fmt: skip
 
@@ -238,7 +238,7 @@ def test_a_gltf_file_that_says_what_is_not_so_is_refused_in_words(
 
 def test_what_is_nested_without_end_is_refused(tmp_path: Path) -> None:
     (tmp_path / "deep.gltf").write_bytes(b'{"asset":' + b"[" * 500_000)
-    with pytest.raises(MeshError, match=r"deep\.gltf' is no glTF 2"):
+    with pytest.raises(MeshError, match=r"deep\.gltf' is not glTF 2"):
         read_surfaces(tmp_path / "deep.gltf")
 
 
@@ -311,15 +311,15 @@ def test_a_polygon_is_a_fan_and_corners_need_not_name_normals(tmp_path: Path) ->
     ("line", "why"),
     [
         ("f 1 2 9", "corners that are none of its 3 points"),
-        ("f 1 2 -9", "in line 4 a corner that names no point"),
-        ("f 1 2 0", "in line 4 a corner that names no point"),
-        ("f 1//1/1 2//1 3//1", "in line 4 a corner that names no point"),
-        ("f 1 2 " + "9" * 5000, "in line 4 a corner that names no point"),
-        ("f 1 2 99999999999999999999", "in line 4 a corner that names no point"),
-        ("f 1 2", "in line 4 a polygon of fewer than three corners"),
-        ("v 1 2", "in line 4 a point or normal without three numbers"),
-        ("v 1 2 x", "in line 4 what is no number"),
-        ("q 1 2 3", "in line 4 'q', which is nothing of flat polygons"),
+        ("f 1 2 -9", "a corner in line 4 that refers to no point"),
+        ("f 1 2 0", "a corner in line 4 that refers to no point"),
+        ("f 1//1/1 2//1 3//1", "a corner in line 4 that refers to no point"),
+        ("f 1 2 " + "9" * 5000, "a corner in line 4 that refers to no point"),
+        ("f 1 2 99999999999999999999", "a corner in line 4 that refers to no point"),
+        ("f 1 2", "a polygon with fewer than three corners in line 4"),
+        ("v 1 2", "a point or normal without three numbers in line 4"),
+        ("v 1 2 x", "a value that is not a number in line 4"),
+        ("q 1 2 3", "'q' in line 4, which does not describe flat polygons"),
     ],
 )
 def test_a_line_that_is_none_is_named(line: str, why: str, tmp_path: Path) -> None:

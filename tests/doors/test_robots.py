@@ -34,7 +34,7 @@ URDF = {
     "links": (urdf(LINKS), "it has 600 links; the most are 500"),
     "large": (urdf(" " * 5_100_000), "robot.xml has 51000"),
     "no XML": ("robot", "it cannot be read: syntax error"),
-    "two bytes a letter": (urdf("").encode("utf-16").decode("latin-1"), "is no UTF-8"),
+    "two bytes a letter": (urdf("").encode("utf-16").decode("latin-1"), "is not UTF-8"),
 }
 
 MJCF = {

@@ -17,7 +17,7 @@ MOST = LIMITS["CSV table"].most
 @pytest.mark.parametrize(
     ("content", "why"),
     [
-        (b"participant,age\nP001,\xe4lt\n", "byte 0xE4 in line 2 is no UTF-8; save it as UTF-8"),
+        (b"participant,age\nP001,\xe4lt\n", "byte 0xE4 in line 2 is not UTF-8; save it as UTF-8"),
         (b"participant,age\nP001,\0\n", "line 2 holds a NUL, which no table does"),
         (b"participant,age\nP001," + b"9" * 140_000, "field larger than field limit"),
         (b"participant,age\nP001,30,left\n", "line 2: this row has more or fewer cells"),

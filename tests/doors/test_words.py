@@ -102,7 +102,7 @@ def test_brackets_inside_a_text_are_no_depth(words: str) -> None:
 
 def test_words_that_no_page_can_show_are_no_answer() -> None:
     item = Item("said", "What?", "text")
-    with pytest.raises(AnswerError, match=re.escape("holds the character U+D800")):
+    with pytest.raises(AnswerError, match=re.escape("contains the character U+D800")):
         item.check("half \ud800")
     words = "„Grüße“ 👋🏽 日本語\n\t\u05e9\u05dc\u05d5\u05dd"
     assert item.check(words) == words

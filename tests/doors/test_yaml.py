@@ -40,11 +40,11 @@ MERGES = "a: &a {x: 1}\n" + "".join(
     [
         (
             "title: a\n\x07",
-            ":2:1: this is no YAML: it holds the character U+0007, which no text may",
+            ":2:1: this is not valid YAML: it contains the character U+0007, which is not",
         ),
         (
             "day: 2001-99-99",
-            ":1:6: this is no YAML: '2001-99-99' looks like a date or a time, and there is none",
+            ":1:6: this is not valid YAML: '2001-99-99' looks like a date or a time but is not",
         ),
         ("[" * 3000, ":1:51: nested deeper than 50 levels; write it flat"),
         ("a:\n" + "- " * 2000, ":2:100: nested deeper than 50 levels; write it flat"),
@@ -56,15 +56,18 @@ MERGES = "a: &a {x: 1}\n" + "".join(
         ("a: !!python/object:os.system x", ":1:4: it holds 'x' with a tag; write plain values"),
         (
             "a: !!int x",
-            ":1:4: this is no YAML: the tag !!int asks for a whole number, which 'x' is not",
+            ":1:4: this is not valid YAML: the tag !!int requires a whole number, which 'x' is not",
         ),
         (
             "a: [1,\n 2, !!bool maybe]",
-            ":2:5: this is no YAML: the tag !!bool asks for true or false",
+            ":2:5: this is not valid YAML: the tag !!bool requires true or false",
         ),
-        ("a: !!map 5", ":1:4: this is no YAML: a tag that asks for keys with values, before none"),
+        (
+            "a: !!map 5",
+            ":1:4: this is not valid YAML: a tag that requires keys with values, before",
+        ),
         ("a:\n  b: [1, !x 5]", ":2:10: it holds '5' with a tag; write plain values"),
-        ("a: &a [*b]", ":1:8: this is no YAML: found undefined alias 'b'"),
+        ("a: &a [*b]", ":1:8: this is not valid YAML: found undefined alias 'b'"),
     ],
 )
 def test_a_hostile_file_is_refused_with_file_and_reason(
@@ -79,9 +82,9 @@ def test_a_hostile_file_is_refused_with_file_and_reason(
 
 def test_bytes_that_are_no_text_and_folders_are_refused(tmp_path: Path) -> None:
     (tmp_path / "wide.yaml").write_bytes("title: ü".encode("utf-16"))
-    with pytest.raises(ProtocolError, match=r"yaml:1:1: byte 0xFF is no UTF-8; .* save it as"):
+    with pytest.raises(ProtocolError, match=r"yaml:1:1: byte 0xFF is not UTF-8; .* save it as"):
         read_yaml(tmp_path / "wide.yaml")
-    with pytest.raises(ProtocolError, match="is no file; give a YAML file"):
+    with pytest.raises(ProtocolError, match="is not a file; give the path of a YAML file"):
         read_yaml(tmp_path)
 
 

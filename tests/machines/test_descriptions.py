@@ -233,7 +233,7 @@ def test_all_kinematics_agree_where_the_boom_stands_before_the_slew_axis() -> No
         ('<child link="gripper"/>', '<child link="link_4"/>', "link 'link_4' hangs on two joints"),
         ('<robot name', '<rabot name', "it cannot be read: mismatched tag"),
         ('xyz="0.126 0 0"', 'xyz="0.126 0"', "xyz='0.126 0' must be three numbers"),
-        ('effort="1"', 'effort="one"', "'joint1': effort='one' is no number"),
+        ('effort="1"', 'effort="one"', "'joint1': effort='one' is not a number"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_named_with_its_joint(

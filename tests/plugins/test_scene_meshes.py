@@ -160,7 +160,7 @@ def test_a_mesh_that_cannot_be_touched_as_it_is_seen_is_refused(
     ("change", "message"),
     [
         ((", mesh: {file: wall.obj, scale: 0.001}", ""), "has its file under mesh, no size"),
-        (("wall.obj", "wall.stl"), "'wall.stl' is no OBJ file, which a mesh that is touched must"),
+        (("wall.obj", "wall.stl"), "'wall.stl' is not an OBJ file; a mesh for contact must be one"),
     ],
 )
 def test_a_mesh_that_is_touched_needs_an_obj_file(

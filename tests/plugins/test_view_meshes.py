@@ -111,7 +111,7 @@ def test_a_mesh_with_what_is_no_number_is_refused_in_words(broken: str, tmp_path
     corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
     more = "v 0 0 1\n" if broken.startswith("vn") else "vn 0 0 1\n"
     path.write_text(f"{corners}{more}{broken}\nf 1//1 2//1 3//1\nf 1//1 2//1 4//1\n")
-    with pytest.raises(ValueError, match=r"broken\.obj' has points or normals that are no finite"):
+    with pytest.raises(ValueError, match=r"broken\.obj' has points or normals that are not finite"):
         MeshFile(file=path)
 
 
@@ -131,7 +131,7 @@ def test_a_mesh_is_scaled_turned_and_put_in_its_place(tmp_path: Path) -> None:
         (
             "a.stl",
             b"nonsense" * 20,
-            r"^mesh '.*a\.stl' says that it has \d+ triangles and has room",
+            r"^mesh '.*a\.stl' states that it has \d+ triangles but has room",
         ),
         ("c.obj", b"v 0 0 0\nv 1 0 0\nl 1 2\n" * 20, r"^mesh '.*c\.obj' holds no triangles"),
     ],
@@ -169,9 +169,9 @@ def a_machine_study(folder: Path, mesh: str) -> Path:
         ),
         (
             "cut.stl",
-            r"mine\.yaml:\d+:\d+: .*cut\.stl' says that it has 4 triangles and has room for 3.96",
+            r"mine\.yaml:\d+:\d+: .*cut\.stl' states that it has 4 triangles but has room for 3.96",
         ),
-        ("arm.step", r"'.*arm\.step' is no mesh; \.stl, \.obj, \.gltf, \.glb can be shown"),
+        ("arm.step", r"'.*arm\.step' is not a mesh file; use \.stl, \.obj, \.gltf, \.glb"),
         ("{file: a.stl, scale: -1}", r"mesh\.scale is -1; it must be greater than 0"),
     ],
 )

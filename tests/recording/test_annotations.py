@@ -107,7 +107,7 @@ def test_a_kill_while_a_mark_is_made_leaves_all_before_and_the_next_one_is_kept(
     [
         ("  ", None, "a mark needs words"),
         ("x" * 4001, None, r"has 4001 characters; the most are 4000"),
-        ("back\u202ewards", None, r"holds the character U\+202E"),
+        ("back\u202ewards", None, r"contains the character U\+202E"),
         ("early", 1.0, "cannot last from 2 to 1 s"),
         ("never", float("nan"), "cannot last from 2 to nan s"),
     ],

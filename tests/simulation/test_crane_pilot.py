@@ -78,7 +78,7 @@ def test_a_folder_stands_for_its_protocol(
     assert "study 'crane_pilot' is fine" in said.out
     assert said.err == ""
     assert main(["check", str(tmp_path)]) == 2
-    assert f"{tmp_path} is no file; give a YAML file" in capsys.readouterr().err
+    assert f"{tmp_path} is not a file; give the path of a YAML file" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -27,9 +27,9 @@ ROUNDING = 1e-12
 
 
 class ChainError(ValueError):
-    """The joints of a file are no slewing base with pitch joints.
+    """The joints of a file are not a slewing base with pitch joints.
 
-    ``name`` is what is not in the file, where that is the matter.
+    ``name`` is the name that is missing in the file, if that is the reason.
     """
 
     def __init__(self, message: str, *, name: str = "") -> None:
@@ -125,7 +125,7 @@ class Axis:
 def machine_fields(
     axes: Sequence[Axis], tip: FloatArray, rest_deg: dict[str, float], thickness: float
 ) -> dict[str, Any]:
-    """Return what a machine's YAML says of ``base_x`` and ``joints``.
+    """Return the values of ``base_x`` and ``joints`` for a machine's YAML.
 
     Parameters
     ----------

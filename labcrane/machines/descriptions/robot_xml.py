@@ -39,7 +39,7 @@ def check_robot(path: Path, folder: Path) -> ElementTree.Element:
     Raises
     ------
     ChainError
-        It is no XML, too large once everything in it is repeated, or names a file elsewhere.
+        It is not XML, too large once its repetitions are expanded, or refers to a file elsewhere.
     """
     return _Look(path, folder).root
 
@@ -126,8 +126,8 @@ def _parsed(path: Path) -> ElementTree.Element:
         check_size(path.stat().st_size, "robot description", f"{path.name}")
         content = path.read_bytes()
         if b"<!DOCTYPE" in content or b"<!ENTITY" in content or b"\x00" in content:
-            raise ChainError("it has a document type, or is no UTF-8; leave out <!DOCTYPE ...>")
-        # No document type, and so no entity, comes to this line.
+            raise ChainError("it has a document type, or is not UTF-8; remove <!DOCTYPE ...>")
+        # A file with a document type, and so with entities, never comes this far.
         parsed = ElementTree.iterparse(io.BytesIO(content), ("start", "end"))  # noqa: S314
         for event, element in parsed:
             root = element if root is None else root

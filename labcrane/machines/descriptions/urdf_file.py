@@ -46,14 +46,14 @@ class UrdfFile:
     Raises
     ------
     ChainError
-        It is no URDF, or its links form no tree.
+        It is not URDF, or its links do not form a tree.
     """
 
     def __init__(self, path: Path, folder: Path, *, meshes: bool = True) -> None:
         self._path, self._folder, self._meshes = path.resolve(), folder.resolve(), meshes
         root = check_robot(path, folder)
         if root.tag != "robot":
-            raise ChainError(f"it is no URDF: its root is <{root.tag}>, and must be <robot>")
+            raise ChainError(f"it is not URDF: its root is <{root.tag}> and must be <robot>")
         if any("xacro" in str(each.tag) for each in root.iter()):
             raise ChainError("it is xacro, not yet URDF; expand it first: xacro FILE > arm.urdf")
         self.title = root.get("name", path.stem)
@@ -160,7 +160,7 @@ class UrdfFile:
             )
         direction = pose[:3, :3] @ _vector(joint.find("axis"), "xyz", (1.0, 0.0, 0.0))
         if not np.any(direction):
-            raise ChainError(f"joint {name!r} has the axis 0 0 0, which is no direction")
+            raise ChainError(f"joint {name!r} has the axis 0 0 0, which is not a direction")
         carries = together([self._mass(each) for each in links])
         if carries.mass <= 0.0:
             raise ChainError(f"nothing that moves with joint {name!r} has a mass")
@@ -306,7 +306,7 @@ def _number(given: Mapping[str, Any], key: str, of: str, otherwise: float | None
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise ChainError(f"{of!r}: {key}={str(given[key])[:40]!r} is no number")
+        raise ChainError(f"{of!r}: {key}={str(given[key])[:40]!r} is not a number")
     return number
 
 

@@ -29,7 +29,7 @@ TRIANGLES, STRIP, FAN = 4, 5, 6
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 FLOATS = 5126
 HARMLESS = ("KHR_materials", "KHR_texture", "KHR_lights", "EXT_texture")
-"""How extensions begin that say nothing of triangles."""
+"""Beginnings of the names of extensions that do not concern triangles."""
 SINGULAR = 1e-12
 
 _Item = TypeVar("_Item")
@@ -103,9 +103,9 @@ class _Tree(_Model):
 def read_glb(data: bytes, folder: Path) -> list[Surface]:
     """Return the triangles of a GLB file, as :func:`read_gltf` does."""
     if data[:4] != MAGIC or int.from_bytes(data[4:8], "little") != VERSION:
-        raise MeshError("is no GLB file of version 2")
+        raise MeshError("is not a GLB file of version 2")
     if int.from_bytes(data[8:12], "little") != len(data):
-        raise MeshError("is cut off: it has not as many bytes as it says")
+        raise MeshError("is cut off: it has fewer bytes than it states")
     chunks: list[tuple[int, bytes]] = []
     at = 12
     while at < len(data):
@@ -133,7 +133,8 @@ def read_gltf(data: bytes, folder: Path, inside: bytes = b"") -> list[Surface]:
     Raises
     ------
     MeshError
-        It is no glTF 2, names what is not there, or needs what cannot be read.
+        It is not glTF 2, refers to something that does not exist, or needs something that cannot
+        be read.
     """
     marks = sum(data.count(mark) for mark in (b",", b"[", b"{"))
     check_size(marks, "values of a mesh", "the mesh")
@@ -142,7 +143,7 @@ def read_gltf(data: bytes, folder: Path, inside: bytes = b"") -> list[Surface]:
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(map(str, first["loc"])) or "it"
-        raise MeshError(f"is no glTF 2: {place[:100]}: {first['msg'][:100]}") from error
+        raise MeshError(f"is not glTF 2: {place[:100]}: {first['msg'][:100]}") from error
     foreign = [name for name in tree.extensionsRequired if not name.startswith(HARMLESS)]
     if foreign:
         raise MeshError(f"needs the extension {foreign[0][:60]!r}; export it without")
@@ -222,9 +223,9 @@ class _File:
         accessor = _at(self._tree.accessors, number, "accessor")
         whole = accessor.componentType != FLOATS
         if accessor.type != kind or whole != (kind == "SCALAR"):
-            raise MeshError(f"has in accessor {number} other values than points or corners need")
+            raise MeshError(f"has values in accessor {number} that are not points or corners")
         if accessor.sparse is not None or accessor.bufferView is None:
-            raise MeshError(f"has values that are sparse, in accessor {number}; export it without")
+            raise MeshError(f"has sparse values in accessor {number}; export it without them")
         view = _at(self._tree.bufferViews, accessor.bufferView, "buffer view")
         dtype = np.dtype((TYPES[accessor.componentType], (3 if kind == "VEC3" else 1,)))
         raw = self._buffer(view.buffer)
@@ -244,7 +245,7 @@ class _File:
             buffer = _at(self._tree.buffers, number, "buffer")
             raw = self._inside if buffer.uri is None else self._fetched(buffer.uri)
             if len(raw) < buffer.byteLength:
-                raise MeshError(f"has in buffer {number} fewer bytes than it says")
+                raise MeshError(f"has fewer bytes in buffer {number} than it states")
             self._buffers[number] = raw
             held = sum(map(len, self._buffers.values()))
             check_size(held, "mesh", "the mesh with the files that it names")
@@ -259,20 +260,20 @@ class _File:
             try:
                 return base64.b64decode(text, validate=True)
             except (binascii.Error, ValueError) as error:
-                raise MeshError("has numbers in its text that are no base64") from error
+                raise MeshError("has numbers in its text that are not base64") from error
         name = unquote(uri)
         if not name.isprintable() or any(mark in name for mark in (":", "\\")):
-            raise MeshError(f"names {uri[:60]!r}; its numbers must be in files beside it")
+            raise MeshError(f"refers to {uri[:60]!r}; its numbers must be in files next to it")
         file, inside = (self._folder / name).resolve(), self._folder.resolve()
         if not file.is_relative_to(inside) or not is_file(file):
-            raise MeshError(f"names {uri[:60]!r}, which is no file beside it or below")
+            raise MeshError(f"refers to {uri[:60]!r}, which is not a file next to it or below")
         check_size(file.stat().st_size, "mesh", f"{name[:60]!r}")
         return file.read_bytes()
 
 
 def _at(items: Sequence[_Item], number: int, kind: str) -> _Item:
     if number >= len(items):
-        raise MeshError(f"names {kind} {number}, and has {len(items)}")
+        raise MeshError(f"refers to {kind} {number}, but has {len(items)}")
     return items[number]
 
 
@@ -299,7 +300,7 @@ def _moved(surface: Surface, place: FloatArray) -> Surface:
         points = surface.points @ turn.T + place[:3, 3]
         size = float(np.linalg.det(turn)) if np.isfinite(turn).all() else np.nan
     if not np.isfinite(size):
-        raise MeshError("has a node that is nowhere: its place is no finite number")
+        raise MeshError("has a node whose position is not finite")
     normals = surface.normals
     if normals is not None:
         cube = float(np.abs(turn).max()) ** 3

@@ -18,7 +18,7 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
         return path  # of a record: where it was, which is another computer's, or gone
     file = info.context["folder"] / path if info.context else path
     if file.suffix.lower() not in FORMATS:
-        raise ValueError(f"{str(path)!r} is no mesh; {', '.join(FORMATS)} can be shown")
+        raise ValueError(f"{str(path)!r} is not a mesh file; use {', '.join(FORMATS)}")
     if not is_file(file):
         raise ValueError(f"there is no mesh {str(file)!r}; a path counts from the file naming it")
     # What is read with needs NumPy, which a protocol without meshes does without.

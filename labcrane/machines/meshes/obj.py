@@ -20,7 +20,7 @@ OTHERS = frozenset(
     b"vt vp p l o g s mg mtllib usemtl usemap maplib bevel c_interp d_interp lod shadow_obj "
     b"trace_obj".split()
 )
-"""What says nothing of triangles; a line that begins with what nobody knows is damage."""
+"""Keywords that do not concern triangles; a line with an unknown keyword is damaged."""
 NORMALS = 3
 """Where a corner names its normal: point, texture, normal."""
 
@@ -43,7 +43,7 @@ def read_obj(data: bytes) -> Surface:
         if first in {b"v", b"vn"}:
             # A point may have a weight or a colour behind it.
             if len(words) < 4 or (first == b"vn" and len(words) > 4):  # noqa: PLR2004 - x, y, z
-                raise MeshError(f"has in line {number} a point or normal without three numbers")
+                raise MeshError(f"has a point or normal without three numbers in line {number}")
             (points if first == b"v" else normals).extend(_floats(words[1:4], number))
         elif first == b"f":
             triangles += len(words) - 3
@@ -54,10 +54,10 @@ def read_obj(data: bytes) -> Surface:
                 corners.append(place)
                 named.append(normal)
             if len(words) < 4:  # noqa: PLR2004 - three corners
-                raise MeshError(f"has in line {number} a polygon of fewer than three corners")
+                raise MeshError(f"has a polygon with fewer than three corners in line {number}")
         elif first not in OTHERS:
             raise MeshError(
-                f"has in line {number} {first[:20].decode('latin-1')!r}, which is nothing of "
+                f"has {first[:20].decode('latin-1')!r} in line {number}, which does not describe "
                 "flat polygons"
             )
     return _surface(_rows(points), _rows(normals), polygons, np.array([corners, named], np.int64))
@@ -100,7 +100,7 @@ def _floats(words: list[bytes], number: int) -> list[float]:
     try:
         return [float(word) for word in words]
     except ValueError as error:
-        raise MeshError(f"has in line {number} what is no number") from error
+        raise MeshError(f"has a value that is not a number in line {number}") from error
 
 
 def _corner(word: bytes, number: int, points: int, normals: int) -> tuple[int, int]:
@@ -110,7 +110,7 @@ def _corner(word: bytes, number: int, points: int, normals: int) -> tuple[int, i
         normal = b"/".join(parts[NORMALS - 1 :])  # a fourth part makes no number of it
         return _place(parts[0], points), _place(normal, normals) if normal else int(_NONE)
     except ValueError as error:
-        raise MeshError(f"has in line {number} a corner that names no point") from error
+        raise MeshError(f"has a corner in line {number} that refers to no point") from error
 
 
 def _place(word: bytes, count: int) -> int:

@@ -21,7 +21,7 @@ def read_stl(data: bytes) -> Surface:
     Raises
     ------
     MeshError
-        It is none, is cut off, or its numbers are none.
+        It is not an STL file, is cut off, or has values that are not numbers.
     """
     count = int.from_bytes(data[80:HEAD], "little")
     if len(data) == HEAD + count * ROW.itemsize and len(data) >= HEAD:
@@ -31,7 +31,7 @@ def read_stl(data: bytes) -> Surface:
     if data.lstrip()[:5].lower() == b"solid":
         return _written(data)
     room = max(0, len(data) - HEAD) / ROW.itemsize
-    raise MeshError(f"says that it has {count} triangles and has room for {room:g}")
+    raise MeshError(f"states that it has {count} triangles but has room for {room:g}")
 
 
 def _surface(normals: "np.typing.ArrayLike", points: "np.typing.ArrayLike") -> Surface:
@@ -51,11 +51,11 @@ def _written(data: bytes) -> Surface:
             continue
         if not inside or first != FACET[at]:
             wanted = " or ".join(("endsolid", FACET[at])[at > 0 :]) if inside else "solid"
-            raise MeshError(f"has in line {number} {first[:20]!r} where {wanted} must be")
+            raise MeshError(f"has {first[:20]!r} in line {number} instead of {wanted}")
         if first in NUMBERS:
             second, count = NUMBERS[first]
             if len(words) != count or second not in {"", words[1].lower()}:
-                raise MeshError(f"has in line {number} no {' '.join((first, second)).strip()}")
+                raise MeshError(f"has no {' '.join((first, second)).strip()} in line {number}")
         if first in {"facet", "vertex"}:
             numbers = normals if first == "facet" else points
             numbers += _floats(words[-3:], number)
@@ -76,4 +76,4 @@ def _floats(words: list[str], number: int) -> list[float]:
     try:
         return [float(word) for word in words]
     except ValueError as error:
-        raise MeshError(f"has in line {number} what is no number") from error
+        raise MeshError(f"has a value that is not a number in line {number}") from error

@@ -37,7 +37,7 @@ class Surface:
     def __post_init__(self) -> None:
         for numbers in (self.points, self.normals):
             if numbers is not None and not np.isfinite(numbers).all():
-                raise MeshError("has points or normals that are no finite numbers")
+                raise MeshError("has points or normals that are not finite numbers")
         check_corners(self.faces, len(self.points))
 
 
