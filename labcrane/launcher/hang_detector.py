@@ -7,10 +7,10 @@ from pathlib import Path
 from labcrane.recording.crash_marker import read_crash_marker, read_number
 
 TELL_S = 2.0
-"""A session that has stood still for so long is told of."""
+"""A session that has not advanced for so long, in seconds, is reported."""
 
 HANG_S = 10.0
-"""A component that keeps a tick for so long hangs: its process is killed."""
+"""A component that delays a tick for so long, in seconds, hangs: its process is killed."""
 
 OPEN_S = 60.0
 """The same before the first tick, when engines and devices are opened."""

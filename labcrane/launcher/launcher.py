@@ -1,8 +1,8 @@
 """Launcher of a run: starts, watches and restarts its processes.
 
-The session process owns the loop, the recorder process the streams of others. Either may die: the
-recorder is started again at once, and after the session's death everything recorded is put into
-the participant file, to be gone on with by ``labcrane resume``.
+The session process owns the loop, the recorder process the external streams. Either may die: the
+recorder is restarted at once, and after the death of the session everything recorded is put into
+the participant file, so that ``labcrane resume`` can continue the session.
 """
 
 import time
@@ -42,7 +42,7 @@ LOOK_S = 0.05
 RECORDER = "recorder"
 
 FOR_THE_RECORD = (Order.NOTE, Order.DENIED)
-"""What is kept for the session when it is said while streams and feedback are waited for."""
+"""Actions that are kept for the session while it waits for streams and feedback."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,11 +54,11 @@ class Outcome:
     died
         Exit code of a session process that died; None when it ended in order.
     where
-        In which component it was when it died; empty when that is not known.
+        The component that was running when it died; empty when that is unknown.
     sync_report
-        How right the session's time stamps are; None when nothing was recorded.
+        Accuracy of the session's timestamps; None when nothing was recorded.
     owed
-        What the session still owes, as people count trials; empty when it ran to its end or has
+        The remaining trials of the session, as people count them; empty when it ran to its end or
         died.
     """
 
@@ -74,9 +74,9 @@ class Launcher:
     Parameters
     ----------
     console
-        Takes orders from people, and is told every event.
+        Takes actions from people, and receives every event.
     say
-        Tells people what the launcher itself has to say.
+        Shows people the messages of the launcher itself.
     """
 
     def __init__(self, visit: Visit, console: QueueConsole, say: Callable[[str], None]) -> None:
@@ -148,7 +148,7 @@ class Launcher:
 
     @property
     def streams_status(self) -> dict[str, Any]:
-        """What the recorder last said of the streams of others; empty without any."""
+        """The recorder's last status of the external streams; empty without any."""
         return self._recorder.status if self._recorder else {}
 
     def _gate(self) -> bool:
@@ -157,7 +157,7 @@ class Launcher:
             return False
         recorder = self._recorder
         told: list[str] = []
-        asked = not self._visit.simulated  # nobody is there to answer, and nothing is required
+        asked = not self._visit.simulated  # no person can answer, and nothing is required
         while recorder is not None and not (recorder.ready and not (asked and recorder.asks)):
             recorder.watch()
             self._kept += self._signals.news(recorder)
@@ -187,7 +187,7 @@ class Launcher:
         return [command for command in orders if command.order is not Order.TAKE]
 
     def _confirm(self, command: Command) -> None:
-        """Let the stream be recorded that somebody says is meant, and put that into the record."""
+        """Record the stream that a person has confirmed, and note that in the record."""
         if self._recorder is None:
             self._say("take: the study records no streams of others")
             return

@@ -87,7 +87,7 @@ def _check_logo(protocol: Path, where: "PageSettings") -> None:
 def left_behind(
     visit: "Visit", outcome: "Outcome | None", report: "SyncReport | None"
 ) -> "SessionLeft":
-    """Return what the supervisor is shown at the end of a run; no outcome is that of an error."""
+    """Return the texts for the experimenter at the end of a run; no outcome means an error."""
     from labcrane.streams.sync.report.sync_report import COLUMNS
     from labcrane.web.state import SessionLeft
 

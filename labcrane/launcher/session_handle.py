@@ -1,4 +1,4 @@
-"""Handle of the session's process: what it is told, and what it says."""
+"""Handle of the session's process: sends it messages and receives its reports."""
 
 import math
 import pickle
@@ -13,14 +13,14 @@ from labcrane.session.visit import Visit
 MODULE = "labcrane.launcher.session_process"
 
 MOST_WAITING = 1000
-"""So many messages may wait for a session that does not take them; it hangs, and is soon killed."""
+"""Most messages that may wait for a session that takes none; it hangs, and is soon killed."""
 
 
 class SessionHandle:
-    """Starts the session of a visit; it is never started again, for it is gone on with.
+    """Starts the session of a visit. It is never restarted; ``labcrane resume`` continues it.
 
-    A session that hangs takes no messages, and may hang in the middle of one: neither makes the
-    launcher wait, for it is the launcher that finds out.
+    A session that hangs takes no messages, and may hang in the middle of one. Neither blocks the
+    launcher, which has to notice it.
 
     Parameters
     ----------

@@ -45,10 +45,10 @@ class Offered:
 
 
 class ParentConsole:
-    """The launcher as the session knows it.
+    """The launcher as the session sees it.
 
-    Neither a launcher that does not read, nor one that stops in the middle of a message, makes the
-    loop wait. When the launcher is gone the session ends: nobody could stop it any more.
+    Neither a launcher that does not read, nor one that stops in the middle of a message, blocks the
+    loop. When the launcher is gone the session ends, because no person could stop it any more.
     """
 
     def __init__(self, parent: Parent) -> None:

@@ -25,8 +25,8 @@ class SignalReporter:
         self._unwatched: list[str] = []
 
     def news(self, recorder: RecorderHandle) -> list[SignalReport]:
-        """Return what has changed since the last call, for the session; people are told here."""
-        if not recorder.status:  # it was started again: nothing is known
+        """Return the changes since the last call, for the session, and report them to people."""
+        if not recorder.status:  # it was restarted: nothing is known
             return []
         now, before = recorder.signals(), self._told
         self._told = now

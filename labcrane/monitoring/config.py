@@ -24,7 +24,7 @@ class MonitorConfig:
     Attributes
     ----------
     protocol
-        The study's protocol, beside which its own plugins and its machine are; empty for none.
+        The study's protocol, whose folder contains its own plugins and machine; empty for none.
     machine
         Name of the machine that is operated.
     use
@@ -37,17 +37,17 @@ class MonitorConfig:
 
     @classmethod
     def of(cls, fields: Mapping[str, Any]) -> "MonitorConfig":
-        """Return the config that JSON holds."""
+        """Return the config of a JSON object."""
         known = cls.__dataclass_fields__
         if unknown := sorted(set(fields) - set(known)):
             raise StreamError(
-                f"monitors cannot be told {', '.join(unknown)}; they can be told {', '.join(known)}"
+                f"monitors have no setting {', '.join(unknown)}; they have {', '.join(known)}"
             )
         return cls(**fields)
 
 
 class MonitorBuilder:
-    """Builds the monitors that know a stream, each anew. For several threads."""
+    """Builds new monitors for each stream, of every kind that knows it. Thread-safe."""
 
     def __init__(self, config: MonitorConfig) -> None:
         path = Path(config.protocol) if config.protocol else None

@@ -71,6 +71,6 @@ class MonitoredStream:
 
 
 def signal_stream(header: StreamHeader) -> SignalStream:
-    """Return a stream as monitors are told of it."""
+    """Return the description of a stream that monitors receive."""
     channels = tuple(SignalChannel(each.label, each.unit, each.type) for each in header.channels)
     return SignalStream(header.name, header.type, header.rate_hz, channels)

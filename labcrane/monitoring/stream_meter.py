@@ -164,7 +164,7 @@ class _Intervals(NamedTuple):
 
 
 def _clock(probes: list[Probe]) -> tuple[float | None, float | None, float | None]:
-    """Return what probes tell of a clock: its offset now, the way to it, and its skew."""
+    """Return the current offset, the round-trip time and the skew of a clock, from its probes."""
     if not probes:
         return None, None, None
     times = np.array([probe.local for probe in probes])

@@ -32,7 +32,7 @@ STORE = ".labcrane-store"
 
 @dataclass
 class Reach:
-    """What an operation has done to copies, and what it has not.
+    """The copies that an operation has changed, and those still unchanged.
 
     Attributes
     ----------
@@ -189,7 +189,7 @@ def _owed_link(path: Path, old: str, new: str | None) -> OwedRemoval:
 def _is_left_over(
     path: Path, people: Sequence[str], old: str, new: str | None, mentions: Mentions
 ) -> bool:
-    """Say whether a file that is said to be of nobody holds somebody all the same."""
+    """Return whether a file that is listed without participants mentions this one."""
     looked_at = old not in people and not path.as_posix().endswith(MANIFEST) and path.is_file()
     return looked_at and not people and old in mentioned(path, mentions)
 
@@ -238,7 +238,7 @@ def edit_file(
 
 
 def _without(name: str, content: bytes, old: str, mentions: Mentions) -> bytes | None:
-    """Return a file of several people without one of them; None where that cannot be told."""
+    """Return a file of several people without one of them; None where that is impossible."""
     suffix = Path(name.removesuffix(PACKED)).suffix
     if name == MANIFEST:
         return _manifest_without(content, old)

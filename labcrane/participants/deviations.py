@@ -13,7 +13,7 @@ ORDERS = {
     "order.skip": "skipped",
     "order.repeat": "trial repeated",
     "order.override": "automatic end overridden",
-    "order.completion": "completion set by the examiner",
+    "order.completion": "completion set by the experimenter",
 }
 
 
@@ -37,7 +37,7 @@ def of_events(session: int, events: Iterable[LoggedEvent]) -> list[Deviation]:
 
 
 def _said(name: str, data: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Return what kind of deviation an event is, and what else is to be said of it."""
+    """Return the kind of deviation that an event is, and its details; None if it is none."""
     if name in ORDERS and not data.get("refused"):
         return ORDERS[name], str(data.get("text") or "")
     if name == "input.lost":

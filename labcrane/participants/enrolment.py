@@ -81,13 +81,13 @@ def check_apart(register: Register, participant: str, instead_of: str = "") -> N
     Parameters
     ----------
     instead_of
-        Somebody whose pseudonym it replaces.
+        The pseudonym that it replaces.
     """
     check_name(participant, "participant")
     if not re.search("[A-Za-z]", participant):
         raise ProtocolError(
-            f"participant {participant!r} cannot be told from a number in a text, and so could not "
-            f"be erased from one; put a letter before it: P{participant}"
+            f"participant {participant!r} cannot be distinguished from an ordinary number and so "
+            f"could not be erased from texts; add a letter: P{participant}"
         )
     for known in register.names():
         if known == instead_of:

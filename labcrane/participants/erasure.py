@@ -48,8 +48,8 @@ class Erased:
 
 
 BEYOND = (
-    "labcrane cannot reach backups, snapshots and copies made by hand, nor what a disk keeps of "
-    "deleted files: have them erased by whoever looks after them"
+    "labcrane cannot reach backups, snapshots, copies made by hand and remains of deleted files on "
+    "a disk; ask their administrators to erase them"
 )
 
 

@@ -23,10 +23,10 @@ def spellings(name: str) -> list[str]:
 
 
 class Mentions:
-    """Finds whose pseudonyms a text holds.
+    """Finds the participants whose pseudonyms a text contains.
 
-    A word that may be two people's is the longer name's. A name without a letter cannot be told
-    from a number, and is found only where it is the whole text, or follows ``sub-``.
+    A word that fits two pseudonyms belongs to the longer one. A pseudonym without a letter looks
+    like a number, and is found only where it is the whole text or follows ``sub-``.
     """
 
     def __init__(self, names: Iterable[str]) -> None:

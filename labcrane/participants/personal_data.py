@@ -16,7 +16,7 @@ _HARMLESS = re.compile(
 )
 _DIGITS = re.compile(r"\+?\(?\d(?:[ ()/.\-]{0,2}\d)+")
 PHONE_DIGITS = 7
-"""Fewer digits than this are no telephone number that would lead to anybody."""
+"""Fewer digits than this are not a telephone number that identifies a person."""
 
 
 def personal(text: str) -> str | None:
@@ -62,7 +62,7 @@ def personal_in(path: Path) -> Iterator[str]:
         if _NUMBER.fullmatch(text.strip()):
             continue
         found = personal(_DIGEST.sub("|", _MOMENT.sub("|", text)))
-        # Numbers in a program's own texts are no telephone numbers.
+        # Numbers in a program's own texts are not telephone numbers.
         if found and ("mail" in found or _is_written(place)):
             yield f"{place}: {found}"
         if home := _HOME.search(text):
@@ -72,7 +72,7 @@ def personal_in(path: Path) -> Iterator[str]:
 
 
 _OWN = ("context", "protocol", "header", "machine", "sync_report", "README", "CITATION")
-"""Texts of a participant file that no participant and no examiner writes."""
+"""Texts of a participant file that neither participants nor experimenters write."""
 
 
 _NUMBERS = (" owed", " repeats", " void")

@@ -1,8 +1,8 @@
 """Files with or about participants, entered into the register before the first one is written.
 
-Whoever writes them, a command or a plugin, is handed the folder that they go into, so that nothing
-can be forgotten: whatever is in it at the end is known by name, and a kill in the middle leaves a
-folder that the register knows to be unfinished.
+Their writer, a command or a plugin, receives the folder for them, so that no file is missed: all
+files in it at the end are known by name. A kill in the middle leaves a folder that the register
+lists as unfinished.
 """
 
 import fnmatch
@@ -55,11 +55,12 @@ class Product:
             self._note({DataFolder.pseudonym(name)})
 
     def files(self) -> dict[str, list[str]]:
-        """Return who is in each file that was written.
+        """Return the participants in each file that was written.
 
-        A file is one participant's own when it is named after them and nobody else, and nothing
-        was written into it while another's data were in hand. One that the exporter declares to be
-        shared holds nobody's data. Every other one may hold everybody's.
+        A file belongs to one participant alone when it is named after that participant only, and
+        nothing was written into it while the data of another were processed. A file that the
+        exporter declares to be shared contains no participant's data. Any other file may contain
+        the data of all.
         """
         self._note(set(self._people))
         return {name: self._who(name) for name in sorted(self._in_hand)}
@@ -109,7 +110,7 @@ def product(
     people
         Whose data go in, by the names of their folders.
     shared
-        Patterns of files that hold nobody's data.
+        Patterns of files that contain no participant's data.
     whole
         Whether everything is worked out of everybody's data, so that it goes as a whole.
     """
@@ -125,7 +126,7 @@ def product(
         whole=whole,
         staging=kept_folder(places, staging),
     )
-    # A program's data are nobody's: without people there is nothing to be kept track of.
+    # Simulated data belong to no person: without people there is nothing to keep track of.
     tracked = places.register.exists() or not all(map(DataFolder.is_simulated, people))
     if tracked:
         with changed(places) as register:
@@ -168,7 +169,7 @@ def files_about(recording: Path, writer: str, target: Path) -> Iterator[Path]:
     recording, target = recording.resolve(), target.resolve()
     data, name = recording.parent.parent, recording.parent.name
     today = datetime.now().astimezone().date()
-    if recording.stem != name or not recording.is_file():  # a copy that somebody took away
+    if recording.stem != name or not recording.is_file():  # a copy in another place
         yield target
         return
     with product(data, writer, target, [name], today) as made:

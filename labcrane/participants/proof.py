@@ -24,7 +24,7 @@ DEEPEST = 4
 """Archives in archives that are opened."""
 
 LARGEST = 2**32
-"""Bytes that are unpacked of one file; more is somebody's trap."""
+"""Most bytes that are unpacked of one file; more may be an archive bomb."""
 
 WINDOW = 1 << 20
 """Bytes that are searched at a time."""
@@ -60,7 +60,7 @@ CLOSED_NAMES = (".gpg", ".pgp", ".age", ".enc", ".kdbx", ".hc", ".vc", ".aes", "
 
 OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 ENCRYPTED_PACKAGE = "EncryptedPackage".encode("utf-16-le")
-"""What an office's document with a password says of itself, in a file of Microsoft's old kind."""
+"""Name by which an office document with a password is known, in Microsoft's older file format."""
 
 
 @dataclass
@@ -131,7 +131,7 @@ class _Search:
                 opens(self, file, name, depth)
             except _Enough:
                 self.closed(name, f"more than {LARGEST >> 30} GB are packed in it")
-            except Exception as error:  # noqa: BLE001 - whoever reads a strange file raises anything
+            except Exception as error:  # noqa: BLE001 - readers of unknown files raise anything
                 self.closed(name, f"it is damaged, or packed otherwise ({type(error).__name__})")
 
     def text(self, content: bytes) -> None:

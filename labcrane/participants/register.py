@@ -102,9 +102,9 @@ class Export(Record):
     """What wrote it: an exporter, or a command."""
     folder: str
     files: dict[str, list[str]]
-    """The participants in each file, by its path in the folder; nobody in one that all share."""
+    """The participants in each file, by its path in the folder; none in a shared file."""
     people: list[str] = Field(default_factory=list)
-    """Everybody whose data went in, while it is being written as well."""
+    """All participants whose data went in, while it is being written as well."""
     whole: bool = False
     """Whether every part of it was worked out of everybody's data: it cannot be edited."""
     staging: str = ""
@@ -139,7 +139,7 @@ class OwedRemoval(Record):
 
 
 class Work(Record):
-    """Something that has been begun, and is to be finished by whoever comes next."""
+    """An operation that was begun, and that the next command has to finish."""
 
     kind: Literal["erase", "relabel"]
     participant: str

@@ -56,7 +56,7 @@ def begin(places: Places, old: str, new: str, reason: str, today: date) -> None:
                 f"{register.pattern!r}"
             )
         if any(stone.participant == new for stone in register.tombstones):
-            raise ProtocolError(f"{new} was erased; nobody can have that pseudonym again")
+            raise ProtocolError(f"{new} was erased; give a pseudonym that was never used")
         known = register.participants.get(new)
         if known is None:
             check_apart(register, new, instead_of=old)
@@ -147,7 +147,7 @@ def _relabel_files(source: Path, target: Path, old: str, new: str) -> None:
 
 
 def _merged(register: Register, work: Work) -> Entry:
-    """Return the entry of the right pseudonym: what was run, whoever it was meant for."""
+    """Return the entry of the correct pseudonym: the sessions run, and the plan they followed."""
     wrong = register.participants[work.participant]
     meant = register.participants.get(work.to)
     detail = (

@@ -33,7 +33,7 @@ def check_group(study: Study, participant: str, entry: Entry) -> None:
         raise ProtocolError(
             f"participant {participant} would be in two groups: enrolled in {entry.group!r}, but "
             f"slot {entry.slot} of the protocol is in {planned!r}; restore the groups of the "
-            "protocol, or enrol the participant anew"
+            "protocol, or enrol the participant again"
         )
 
 

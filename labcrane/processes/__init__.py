@@ -1,5 +1,5 @@
-"""Processes of their own, one way for all: session, recorder, feedback, page, doctor's looks.
+"""Child processes, handled in one way: session, recorder, feedback, page, checks of ``doctor``.
 
-In comes a module to run and what it is told; out go its messages, and word of its end. What stalls,
-crashes or hangs there costs nothing here.
+In come a module to run and the messages for it; out go its messages and the notice of its end. A
+child that stalls, crashes or hangs does not delay this process.
 """

@@ -1,9 +1,9 @@
-"""Handle of a child process: starts it, hears it, tells it, starts it again, ends it.
+"""Handle of a child process: starts it, exchanges messages with it, restarts it, ends it.
 
-A child is a module run by ``python -m``. It is told its order and messages on its standard input
+A child is a module run by ``python -m``. It receives its order and messages on its standard input
 and answers on its standard output, pickled (:class:`labcrane.processes.parent.Parent` is its side).
-Threads read and write, so that neither a child that hangs nor one that dies makes anybody wait, on
-any system: nothing is polled that only some of them can poll.
+Threads read and write, so that a child that hangs or dies never blocks this process. This works on
+every system, because nothing is polled that only some of them can poll.
 """
 
 import math
@@ -21,12 +21,12 @@ from typing import IO, Any
 from labcrane.processes.messages import Inbox, received, send
 
 LAST_S = 1.0
-"""How long the last words of a process that has ended may take to be read."""
+"""How long reading the last messages of a process that has ended may take, in seconds."""
 
 
 SAFELY = ("-P",)
-"""For Python: modules are not looked for in the folder where somebody happens to stand, which may
-hold the data of strangers, and a ``json.py`` among them."""
+"""Option of Python: modules are not searched in the current folder, which may contain the files of
+strangers, such as a ``json.py``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,11 +80,11 @@ class ProcessHandle:
     Attributes
     ----------
     ready
-        Whether the present process could begin its work; set by whoever understands its messages.
+        Whether the present process could begin its work; set by the code that reads its messages.
     restarts
-        How often it was started again.
+        How often it was restarted.
     given_up
-        Whether it is left out: it came to nothing too often.
+        Whether it is no longer restarted: it failed too often.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class ProcessHandle:
         self._life: _Life | None = None
 
     def start(self, order: object = None) -> None:
-        """Start a process and tell it its order; without one it waits for what it is told."""
+        """Start a process and send it its order; without one it waits for messages."""
         if self._life is not None:
             raise AssertionError(f"{self.name} is started once; restart starts it again")
         self._life = self._begun(order)
@@ -154,11 +154,11 @@ class ProcessHandle:
         return self._inbox.wait(seconds)
 
     def worked(self) -> None:
-        """Note that the present process did what it is for: restarts are counted anew."""
+        """Note that the present process did its work: the count of restarts begins again."""
         self._fruitless = 0
 
     def restart(self, order: object) -> bool:
-        """End the present process and start another; False when that came to nothing too often.
+        """End the present process and start another; False when that failed too often.
 
         Call it when :attr:`failure` says why.
         """

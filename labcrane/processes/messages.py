@@ -21,16 +21,16 @@ class Inbox(Generic[MessageT]):
         self._news = threading.Event()
 
     def put(self, message: MessageT) -> None:
-        """Put in a message; whoever waits wakes up."""
+        """Put in a message, and wake up waiting threads."""
         self._incoming.put(message)
         self._news.set()
 
     def wake(self) -> None:
-        """Wake up whoever waits, without a message."""
+        """Wake up waiting threads, without a message."""
         self._news.set()
 
     def messages(self) -> list[MessageT]:
-        """Return what has come since the last call, without waiting."""
+        """Return the messages since the last call, without waiting."""
         self._news.clear()
         found = []
         with suppress(queue.Empty):

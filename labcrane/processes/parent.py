@@ -66,7 +66,7 @@ class Parent:
         yield from self._inbox.messages()
 
     def close(self, patience_s: float | None = 5.0) -> None:
-        """Wait until all that was told is on its way; call it last."""
+        """Wait until all messages are sent; call it last."""
         self._outgoing.put(None)
         self._closed.wait(patience_s)
 

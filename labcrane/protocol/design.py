@@ -32,13 +32,14 @@ FactorName = Annotated[str, AfterValidator(_is_no_missing_value)]
 """A name that is a value in tables: of a group, a condition, a task, a block or a session."""
 
 RULES = ("as_written", "blocked", "latin_square", "shuffled", "williams")
-"""What a protocol may say under ``design: order:``; :mod:`labcrane.design.order` follows it."""
+"""Rules that a protocol may name under ``design: order:``; :mod:`labcrane.design.order` applies
+them."""
 
 LIMITED = frozenset({"shuffled", "blocked"})
-"""Rules that can be told how often a level may come in a row."""
+"""Rules that take a limit of how often a level may come in a row."""
 
 MOST_COUNTED = 200_000
-"""States whose ways to go on are counted to draw an order: beyond it takes seconds, then hours."""
+"""Most states whose continuations are counted to draw an order: more take seconds, then hours."""
 
 
 class LevelOrder(Settings):
@@ -58,7 +59,7 @@ class LevelOrder(Settings):
     @classmethod
     def _rule_exists(cls, rule: str) -> str:
         if rule not in RULES:
-            raise ValueError(f"{rule!r} is no rule; it can be {', '.join(RULES)}")
+            raise ValueError(f"{rule!r} is not a rule; use one of {', '.join(RULES)}")
         return rule
 
     @field_validator("in_a_row")
@@ -164,7 +165,7 @@ class Design(Settings):
     def _once(cls, primary: tuple[str, ...]) -> tuple[str, ...]:
         for at, name in enumerate(primary):
             if name in primary[:at]:
-                raise ValueError(f"{name!r} stands there twice; once is enough")
+                raise ValueError(f"{name!r} is listed twice; list it once")
         return primary
 
     @field_validator(

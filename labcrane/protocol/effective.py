@@ -20,9 +20,9 @@ class Quantity:
     value, unit
         What is used.
     written
-        What stands there; a plain number, or one with a unit of its own.
+        The text in the file; a plain number, or one with a unit of its own.
     usual
-        Of what size it usually is; None where that is not known.
+        Its usual size; None where that is unknown.
     """
 
     place: Place

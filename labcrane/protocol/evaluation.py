@@ -4,7 +4,7 @@ from labcrane.files.model import StrictModel
 
 
 class StopRule(StrictModel):
-    """A score above which the session pauses and the examiner decides."""
+    """A score above which the session pauses and the experimenter decides."""
 
     questionnaire: str
     """Which of the study's questionnaires."""

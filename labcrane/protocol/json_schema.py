@@ -41,7 +41,7 @@ def protocol_schema(registry: Registry) -> Schema:
         protocol["properties"][key] = _use(registry, of, named)
     for key, of in by_name.items():
         place = protocol["properties"][key]
-        for part in (place, *place.get("anyOf", ())):  # null may stand for a default
+        for part in (place, *place.get("anyOf", ())):  # null may select a default
             if part.get("type") == "object":
                 part |= {"additionalProperties": _use(registry, of, named)}
     protocol["properties"]["machine"]["anyOf"] = [
@@ -82,7 +82,7 @@ def _with_units(schema: Any) -> Any:
 NUMBERS = {"number", "integer"}
 
 ABOUT = ("title", "description", "default", "examples")
-"""What a schema says of a key as a whole."""
+"""Fields of a schema that describe a key as a whole."""
 
 
 def _or_quantity(schema: Schema) -> Schema:

@@ -55,18 +55,18 @@ def unserved(certificate: Path, key: Path) -> str:
 
 
 class PageSettings(Settings):
-    """Of the supervisor's and the participant's page."""
+    """Of the experimenter's and the participant's page."""
 
     host: str = "127.0.0.1"
     """Address at which they are served: this computer only by default. An address of the lab's
-    network, ``192.168.1.20``, opens them to its tablets; whoever has no token is refused."""
+    network, ``192.168.1.20``, opens them to its tablets; requests without a token are refused."""
 
     port: int = Field(default=0, ge=0, le=65535)
     """Port; 0 takes a free one."""
 
     certificate: Path | None = None
     """The lab's certificate in PEM, with which the pages are served over TLS; a path counts from
-    the protocol. Without it, whoever listens on the lab's network can read along."""
+    the protocol. Without it, the lab's network carries the pages unencrypted."""
 
     key: Path | None = None
     """The certificate's private key in PEM, without a passphrase."""
@@ -99,8 +99,8 @@ class PageSettings(Settings):
                 ip_address(host)
             except ValueError:
                 raise ValueError(
-                    f"{host!r} is no address; write four numbers from 0 to 255, as 192.168.1.20, "
-                    "and the port as port:"
+                    f"{host!r} is not an address; write four numbers from 0 to 255, such as "
+                    "192.168.1.20, and the port under port:"
                 ) from None
         return host
 
@@ -119,7 +119,7 @@ class PageSettings(Settings):
     def _is_a_picture(cls, logo: Path | None) -> Path | None:
         if logo is not None and logo.suffix.lower() not in PICTURES:
             raise ValueError(
-                f"{logo.name!r} is no picture that pages show; give {', '.join(PICTURES)}"
+                f"{logo.name!r} is not a picture that pages show; use {', '.join(PICTURES)}"
             )
         return logo
 
@@ -143,8 +143,8 @@ class PageSettings(Settings):
             sign = PICTURES[kind]
             if not (sign in raw if kind == ".svg" else raw.startswith(sign)):
                 raise ProtocolError(
-                    f"page.logo is {self.logo.name!r}, and what is in it is no {kind[1:].upper()}; "
-                    "export the picture anew",
+                    f"page.logo is {self.logo.name!r}, but its content is not {kind[1:].upper()}; "
+                    "export the picture again",
                     at=("logo",),
                 )
         return {}

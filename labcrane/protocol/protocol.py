@@ -75,8 +75,8 @@ class Participants(Section):
             re.compile(pattern)
         except re.error as error:
             raise ValueError(
-                f"{pattern!r} is no regular expression: {error}; write one, as P\\d{{3}} for "
-                "P001 to P999"
+                f"{pattern!r} is not a regular expression: {error}; write one, such as P\\d{{3}} "
+                "for P001 to P999"
             ) from None
         return pattern
 
@@ -169,10 +169,10 @@ class Protocol(Section):
     """How the performance indicator is worked out."""
 
     stop_rules: tuple[StopRule, ...] = ()
-    """Scores above which the session pauses and the examiner decides."""
+    """Scores above which the session pauses and the experimenter decides."""
 
     page: PageSettings = PageSettings()
-    """Where the supervisor's and the participant's page are served."""
+    """Where the experimenter's and the participant's page are served."""
 
     feedback: dict[str, Use] = Field(default_factory=dict)
     """What can be switched on during trials, by name: cues for every view, and sounds."""
@@ -209,7 +209,7 @@ class Protocol(Section):
     record it with the session, or refuse to run."""
 
     expected: tuple[str, ...] = ()
-    """Answers to the questions of ``labcrane check``, by their keys: what is asked is meant."""
+    """Keys of warnings of ``labcrane check`` about settings that are intended."""
 
 
 def protocol_model() -> type[Protocol]:
@@ -241,7 +241,7 @@ def read(path: Path, *, recorded: bool = False) -> tuple[Protocol | None, YamlFi
     Raises
     ------
     ProtocolError
-        The file does not exist or is no YAML.
+        The file does not exist or is not valid YAML.
     """
     source = YamlFile.read(path, recorded=recorded)
     if not isinstance(source.data, dict):

@@ -1,6 +1,6 @@
-"""Questions: what a protocol may say, and hardly anybody means.
+"""Warnings of ``check``: settings that are allowed, but probably a mistake.
 
-Each has a key, which a protocol answers under ``expected:``; then it is not asked again.
+Each has a key. A protocol that lists the key under ``expected:`` gets no such warning again.
 """
 
 import math
@@ -69,16 +69,16 @@ PLAUSIBLE: Mapping[str, tuple[float, float]] = {
 
 @dataclass(frozen=True, slots=True)
 class CheckQuestion:
-    """Something that can be run, and is hardly meant.
+    """A warning: the protocol can be run, but contains what is probably a mistake.
 
     Attributes
     ----------
     key
-        By which ``expected:`` answers it: ``tasks.aiming.limit_s``.
+        The key that answers it under ``expected:``: ``tasks.aiming.limit_s``.
     place
         Where it is in the protocol.
     text
-        What is asked, with numbers and units.
+        The warning, with numbers and units.
     """
 
     key: str
@@ -87,12 +87,12 @@ class CheckQuestion:
 
     @property
     def whole(self) -> str:
-        """The question, and how it is answered."""
+        """The warning, and how to answer it."""
         return f"{self.text} (if it is, write expected: [{self.key}])"
 
 
 def questions(study: Study) -> tuple[CheckQuestion, ...]:
-    """Return what should be asked before people take part, and has not been answered."""
+    """Return the warnings that need an answer before people take part."""
     found = list(dict.fromkeys(_asked(study)))  # of one place there may be several
     asked = {each.key for each in found}
     expected = study.protocol.expected
@@ -100,8 +100,8 @@ def questions(study: Study) -> tuple[CheckQuestion, ...]:
         CheckQuestion(
             f"expected.{at + 1}",
             ("expected", at),
-            f"expected has {key!r}, which nothing asks; "
-            f"{suggestion(key, asked, 'asked is') if asked else 'leave it out'}",
+            f"expected: {key!r} matches no warning; "
+            f"{suggestion(key, asked, 'there is') if asked else 'remove it'}",
         )
         for at, key in enumerate(expected)
         if key not in asked and not key.startswith(REHEARSAL)
@@ -110,12 +110,12 @@ def questions(study: Study) -> tuple[CheckQuestion, ...]:
 
 
 Finding = dict[str, Any]
-"""What a check tells a program of one finding: kind, file, line, column, key, text, the text with
-what answers a question, and all in one line as people read it."""
+"""One finding of a check, for programs: kind, file, line, column, key, text, the text with the way
+to answer a warning, and all of it in one line for people."""
 
 
 def about(study: Study, question: CheckQuestion) -> Finding:
-    """Return what is told of a question."""
+    """Return the finding of a warning."""
     line, column = study.source.position(question.place) if study.source else (1, 1)
     return {
         "kind": "question",
@@ -130,7 +130,7 @@ def about(study: Study, question: CheckQuestion) -> Finding:
 
 
 def problems(error: LabcraneError) -> list[Finding]:
-    """Return what is told of every mistake in an error, one a line."""
+    """Return a finding for every mistake in an error, which has one a line."""
     found = []
     for whole in str(error).splitlines():
         at = _AT.match(whole)
@@ -165,7 +165,7 @@ Doubts = Iterator[tuple[Place, str]]
 
 
 def _doubts(study: Study) -> Doubts:
-    yield from _of_sizes(study)  # first: what others ask of the same number says more
+    yield from _of_sizes(study)  # first: other warnings about the same number are more specific
     yield from _of_components(study)
     yield from _of_commas(study)
     yield from _of_the_loop(study)
@@ -292,7 +292,8 @@ def _of_what_is_told(study: Study) -> Doubts:
 
 
 Facts = Mapping[str, float]
-"""Up to which distance, in metres, each fact of the error is told; infinity where at any."""
+"""Largest distance, in metres, at which each fact about the error is shown; infinity without
+a limit."""
 
 
 def _facts(study: Study, feedback: Sequence[str]) -> Facts:
@@ -305,7 +306,7 @@ def _facts(study: Study, feedback: Sequence[str]) -> Facts:
 
 
 def _told_apart(what: str, ways: Mapping[Place, tuple[str, Facts]]) -> Doubts:
-    """Question each way of telling, by name and facts, that tells other facts than one before."""
+    """Question each way of feedback, by name and facts, that shows other facts than one before."""
     seen: list[tuple[str, Facts]] = []
     for place, (name, facts) in ways.items():
         if not facts or any(facts == others for _, others in seen):
@@ -317,14 +318,14 @@ def _told_apart(what: str, ways: Mapping[Place, tuple[str, Facts]]) -> Doubts:
             )
             yield (
                 place,
-                f"{what} {other} and {name} are not told the same: {said}; the way of telling "
-                "cannot be told from what is told",
+                f"{what} {other} and {name} do not give the same information: {said}; the effect "
+                "of the form cannot be distinguished from that of the information",
             )
         seen.append((name, facts))
 
 
 def _only(facts: Facts, others: Facts) -> str:
-    """Return in words what is told here and not there, or not so far."""
+    """Return in words the facts that only the first gives, or gives at larger distances."""
     return " and ".join(
         str(Within(fact, far)) if far < math.inf else fact + ", at any distance" * (fact in others)
         for fact, far in sorted(facts.items())
@@ -349,7 +350,7 @@ def _of_components(study: Study) -> Doubts:
 
 
 def _of_sizes(study: Study) -> Doubts:
-    """Question every number that nobody would write, in its unit or without one."""
+    """Question every number of implausible size, in its unit or without one."""
     for each in written_numbers(study):
         least, most = PLAUSIBLE[each.unit]
         said = f"{key_of(each.place)} is {each.value:g} {each.unit}".rstrip()
@@ -368,8 +369,8 @@ def _of_the_operator(study: Study) -> Iterator[CheckQuestion]:
         yield CheckQuestion(
             "operator",
             ("operator", "use"),
-            f"the operator, {study.operator.name!r}, is a device that somebody moves, so that the "
-            "study can be neither simulated nor rehearsed; is that meant?",
+            f"the operator, {study.operator.name!r}, is a device that a person moves, so the study "
+            "can be neither simulated nor rehearsed; is that meant?",
         )
         return
     if lacks := dict.fromkeys(name for _, name in study.beyond_operator):
@@ -574,7 +575,7 @@ def _of_joint(study: Study, key: str, joint: str) -> Place:
 
 
 def _of_silent_blocks(study: Study) -> Doubts:
-    """Question that every group is given all feedback because a block says nothing of it."""
+    """Question that every group gets all feedback because a block does not specify any."""
     if not (study.protocol.design.groups and study.protocol.feedback):
         return
     all_of_it = ", ".join(study.protocol.feedback)
@@ -592,10 +593,10 @@ def _of_silent_blocks(study: Study) -> Doubts:
 
 
 def _of_what_groups_are_not_given(study: Study) -> Doubts:
-    """Question feedback of a step for whoever is of a group that is not given it.
+    """Question feedback of a step for participants of a group that does not get it.
 
-    Whether it tells the error does not matter: what tells the difference of two groups is given to
-    one of them alone.
+    This holds for feedback that does not show the error as well: feedback that distinguishes two
+    groups is given to one of them only.
     """
     groups = study.protocol.design.groups
     for place, block in _blocks(study):
@@ -693,8 +694,9 @@ def _of_conditions(study: Study) -> Doubts:
     if CONDITION not in design.order:
         yield (
             ("design", "order", CONDITION),
-            "design has no order for condition, so that conditions come in one order for everybody "
-            "and what they do cannot be told from learning; write order: {condition: latin_square}",
+            "design has no order for condition, so conditions come in one order for everybody and "
+            "their effect cannot be distinguished from learning; write order: {condition: "
+            "latin_square}",
         )
 
 
@@ -743,13 +745,13 @@ def _steps(study: Study) -> Iterator[tuple[Place, str, Block]]:
 
 
 def _of_what_counts(study: Study) -> Doubts:
-    """Question a study of which nothing is a result."""
+    """Question a study without any results."""
     kinds = dict.fromkeys(kind for _, kind, _ in _steps(study))
     if "block" not in kinds:
-        only = f", only {' and '.join(kinds)}, which counts for nothing" if kinds else ""
+        only = f", only {' and '.join(kinds)}, whose trials are not counted" if kinds else ""
         yield (
             ("sessions",),
-            f"no session has a block{only}, so that a report has no result; write block: "
+            f"no session has a block{only}, so a report has no result; write block: "
             "{task: ...} where trials count",
         )
     for name, task in study.tasks.items():
@@ -823,8 +825,8 @@ def _of_orders(study: Study) -> Doubts:
                     (*place, factor),
                     f"the block takes {used} of the {len(levels)} {factor} of {block.task!r}, "
                     f"whose order is {protocol.design.order[factor].rule}: each participant does "
-                    "another part of them, so that what they differ in is no factor that everybody "
-                    f"meets; leave {factor} out, give the task fewer levels, or write order: "
+                    "a different part of them, so not everybody meets all levels of this factor; "
+                    f"leave {factor} out, give the task fewer levels, or write order: "
                     f"{{{factor}: as_written}} for the same part",
                 )
             elif used > 1 and factor not in protocol.design.order:
@@ -833,8 +835,8 @@ def _of_orders(study: Study) -> Doubts:
         of = ", ".join(map(repr, dict.fromkeys(tasks)))
         yield (
             ("design", "order", factor),
-            f"design says no order for {factor} of {of}, so that they come as written, in one "
-            "order for everybody, and what they do cannot be told from learning; write order: "
+            f"design has no order for {factor} of {of}, so they come as written, in one order for "
+            "everybody, and their effect cannot be distinguished from learning; write order: "
             f"{{{factor}: shuffled}} under design, or as_written",
         )
 
@@ -934,8 +936,8 @@ def _of_orders_of_blocks(study: Study) -> Doubts:
         yield (
             (*place, "task" if other.task != block.task else "feedback"),
             f"steps {first + 1} and {at + 1} of {study.protocol.sessions[session].name!r} differ "
-            f"in {what} and come in this order for everyone, so that what it does cannot be told "
-            f"from what people learn{way}",
+            f"in {what} and come in this order for everyone, so its effect cannot be distinguished "
+            f"from learning{way}",
         )
 
 

@@ -26,10 +26,10 @@ def plain_settings(settings: Settings, folder: Path) -> Any:
 
 
 def named_files(every: Iterable[Settings], folder: Path) -> dict[str, dict[str, str | None]]:
-    """Return what is in every file that settings name, by its name from ``folder``.
+    """Return the content of every file that settings name, by its path from ``folder``.
 
-    So are the YAML files that these name under ``use``, and the meshes under ``mesh``. ``text`` is
-    None for what is no text; ``sha256`` there is always.
+    It includes the YAML files that these name under ``use``, and the meshes under ``mesh``.
+    ``text`` is None for files that are not text; ``sha256`` always exists.
     """
     found: dict[str, dict[str, str | None]] = {}
     for settings in every:

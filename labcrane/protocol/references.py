@@ -40,7 +40,7 @@ READ_BY_BUILDING = frozenset({"input", "operator", "scheme", "dynamics"})
 those that name any. Views and sounds are built by a rehearsal."""
 
 BUILT = frozenset({"tasks", "questionnaires"})
-"""Keys of what a check builds: what building finds is told there."""
+"""Keys of the components that a check builds; it reports the mistakes that building finds."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,9 @@ class Parts:
     tasks
         The tasks that could be built.
     sections
-        Parts of the protocol that are nobody's components, by their place.
+        Parts of the protocol that belong to no component, by their place.
     faulty
-        Components with wrong numbers, which were noted, and have their defaults here.
+        Components with wrong numbers, which were noted; here they have their defaults.
     """
 
     machine: Machine
@@ -109,9 +109,9 @@ class ReferenceChecker:
                 )
 
     def _read(self, place: Place, choice: ComponentSpec, *, faulty: bool) -> None:
-        """Build what names files, so that what is wrong inside of them is found before a run.
+        """Build a component that names files, so that mistakes in the files are found before a run.
 
-        Of what is ``faulty`` anyway only what is said of the files is told, and that once.
+        Of a component that is ``faulty`` anyway, only mistakes in the files are reported, once.
         """
         named = [key for key, each in choice.settings if any(paths_in(each))]
         if not named or choice.offer.missing:
@@ -149,7 +149,7 @@ class ReferenceChecker:
             self._source.problem(at, message, key=mention.key)
 
     def _is_the_file(self, at: Place, mark: Reference, path: Path, known: frozenset[str]) -> None:
-        """Note a file that is not among those known, which are told by their path or their name."""
+        """Note a file that is not among the known ones, which have a path or a name."""
         name = _stem(path)
         if name in known or normpath(path) in map(normpath, known):
             return
@@ -163,9 +163,9 @@ class ReferenceChecker:
         self._source.problem(at, what)
 
     def beyond_the_operator(self) -> Iterator[tuple[Place, str]]:
-        """Yield axes and buttons of the input that the operator who stands in for it has not.
+        """Yield axes and buttons of the input that the operator, its substitute, does not have.
 
-        That is where each is named, and its name.
+        Each comes with the place where it is named, and its name.
         """
         for place, choice in self._components.items():
             if place in {("input",), ("operator",)}:
@@ -188,7 +188,7 @@ class ReferenceChecker:
     ) -> Known:
         if mark.of:
             view = self._components.get(("views", str(getattr(choice.settings, mark.of, ""))))
-            return self._own(view, mark.kind) if view else None  # that there is none is told there
+            return self._own(view, mark.kind) if view else None  # a missing view is reported there
         if mark.own:
             return self._of_holders(mention, mark.kind, choice)
         return self._names(mark.kind, at)

@@ -93,7 +93,7 @@ class Break(Section):
     """A pause in which the machine rests."""
 
     seconds: Annotated[NonNegativeFloat, Unit("s")]
-    """How long it lasts, in seconds; the examiner can end it earlier, which is recorded."""
+    """How long it lasts, in seconds; the experimenter can end it earlier, which is recorded."""
 
 
 FIXATION_POINTS = ((0.5, 0.5), (0.15, 0.15), (0.85, 0.15), (0.85, 0.85), (0.15, 0.85))
@@ -148,8 +148,8 @@ class Session(Section):
     """Earliest and latest day after the session before: ``[1, 3]``."""
 
     window_s: Annotated[PositiveFloat | None, Usual(10.0, 86_400.0)] = None
-    """How long the visit may take, in seconds, as participants are told and rooms are booked:
-    ``90 min``. A check asks about a session that is likely to take longer."""
+    """How long the visit may take, in seconds, as announced to participants and booked for rooms:
+    ``90 min``. A check warns of a session that is likely to take longer."""
 
     steps: tuple[Step, ...] = Field(min_length=1)
     """What happens, in order."""
@@ -245,7 +245,7 @@ def _timed(source: YamlFile, place: Place, value: Any) -> dict[str, Any] | None:
 
 
 def _no_step(source: YamlFile, place: Place, step: Any) -> None:
-    """Note what is no step: often what belongs to one is not indented below it."""
+    """Note a value that is not a step: often, its keys are not indented below it."""
     (kind, value), *beside = (isinstance(step, dict) and step.items()) or [("", "")]
     if kind in STEPS and value is None and not any(key in STEPS for key, _ in beside):
         key = beside[0][0]

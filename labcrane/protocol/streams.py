@@ -59,13 +59,13 @@ class StreamNeed(Settings):
     own header states holds by default; where it states nothing, no gaze is measured."""
 
     min_delay_s: Annotated[NonNegativeFloat | None, Usual(1e-5, 2.0)] = None
-    """For a device whose samples are stamped when they are sent: the shortest time from sampling to
-    stamping, in seconds. It cannot be observed. Without it, stamps are taken to scatter evenly
-    around the truth."""
+    """For a device whose samples get their timestamps when they are sent: the shortest time from
+    sampling to sending, in seconds. It cannot be observed. Without it, the scatter of timestamps is
+    assumed to be centred on the true times."""
 
     evening: Literal["auto", "forbid", "force"] = "auto"
-    """Whether stamps of a regular stream are made even: only where they are shown to scatter about
-    a steady sample clock, never, or always. The times without evening are kept as well."""
+    """Whether timestamps of a regular stream are dejittered: only where they demonstrably scatter
+    about a steady sample clock, never, or always. The times before dejittering are kept as well."""
 
     @model_validator(mode="after")
     def _names_a_stream(self) -> "StreamNeed":

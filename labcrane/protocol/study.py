@@ -56,11 +56,11 @@ class Study:
     recorded
         Whether it was read as the record of what was run.
     beyond_operator
-        Where axes and buttons are named that the input has, and the operator has not.
+        Places that name axes and buttons of the input that the operator does not have.
     outdated
-        What would be refused of it today, where it is gone on with as it was begun.
+        Settings that would be refused today, of a session that continues as it was begun.
     answers
-        What a simulated participant says, by questionnaire and item; the rest is drawn.
+        Answers of a simulated participant, by questionnaire and item; the rest is sampled.
     source
         The protocol's file, which knows the line of everything.
     """
@@ -115,7 +115,7 @@ class Study:
 
     @property
     def written(self) -> Mapping[str, object]:
-        """What the protocol's file has at its top level, as it stands there; none of a record's."""
+        """Top level of the protocol's file, as it is written; empty for a record."""
         return self.source.data if self.source else {}
 
     def where(self, place: Place) -> str:
@@ -196,7 +196,7 @@ NO_GROUPS = (
 
 
 class Checker:
-    """Notes what a protocol asks of its parts and they do not have."""
+    """Notes names and numbers in a protocol that its parts do not have."""
 
     def __init__(self, source: YamlFile, protocol: Protocol) -> None:
         self._source = source
@@ -220,9 +220,8 @@ class Checker:
         if self._protocol.participants.ends_early:
             self._source.problem(
                 ("participants", "pattern"),
-                f"participants.pattern '{self._protocol.participants.pattern}' is matched by "
-                "nobody; ^ stands at a name's beginning only and $ at its end, and neither is "
-                "needed",
+                f"participants.pattern '{self._protocol.participants.pattern}' matches no name; "
+                "^ fits the beginning of a name only and $ its end, and neither is needed",
             )
 
     def _check_names(self) -> None:
@@ -353,7 +352,7 @@ class Checker:
                 close = meant(factor, [*Block.model_fields, *factors])
                 listed = ", ".join(factors) or "nothing"
                 there = f"{close} it varies {listed}".lstrip()
-                message = f"{factor!r} is no key of a block and nothing the task varies; {there}"
+                message = f"{factor!r} is not a key of a block or a factor of the task; {there}"
             elif not (self._is_count(count) and 1 <= count <= len(factors[factor])):
                 most = len(factors[factor])
                 message = f"{factor} is {written(count)}; it must be a whole number, 1 to {most}"

@@ -176,7 +176,7 @@ class Track(Settings):
             raise WrongKey(told, at=at)
         if self.start and self.start not in self.levels:
             raise WrongKey(
-                f"start is {self.start!r}, which is no level; there is {', '.join(self.levels)}",
+                f"start is {self.start!r}, which is not a level; there is {', '.join(self.levels)}",
                 at=("start",),
             )
         if bool(self.measure) != (self.at_least is not None or self.at_most is not None):
@@ -222,7 +222,7 @@ class Track(Settings):
         return "QUEST+"
 
     def judge(self, outcome: Phase, results: Mapping[str, Value]) -> bool | None:
-        """Return whether a trial is a success; None where it says nothing of the participant."""
+        """Return whether a trial is a success; None where it does not reflect the participant."""
         if outcome not in JUDGED:
             return None
         if outcome is not Phase.SUCCESS or not self.measure:

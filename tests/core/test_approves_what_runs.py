@@ -111,7 +111,7 @@ def test_whatever_a_rehearsal_raises_is_a_finding_with_its_block(
             with pytest.raises(ProtocolError, match="it ends in AssertionError") as raised:
                 rehearse(study)
         said = str(raised.value)
-        assert "is a fault of labcrane and not of yours; report it, with the protocol" in said
+        assert "is a fault of labcrane, not of your protocol; report it with the protocol" in said
         assert "test_approves_what_runs.py:" in said
         if name == "_block":
             assert said.startswith(at)

@@ -140,7 +140,7 @@ def test_a_mistake_is_named_with_what_to_write(text: str, said: str, tmp_path: P
         (written(blocks=BLOCKS.replace("pairs: 1, condition: 2", "pairs: 2, condition: 2")),
          "the blocks of the conditions differ in task, repeat or levels"),
         (written("{ball: [ball], tone: [aside]}").replace("design:", f"{ASIDE}design:", 1),
-         "conditions 'ball' and 'tone' are not told the same: in 'tone' alone people learn on"),
+         "conditions 'ball' and 'tone' do not give the same information: in 'tone' alone people"),
         (written("{plain: none, also: []}"), "'plain' and 'also' are given the same feedback"),
         (written(order=""), "conditions come in one order for everybody and what they do"),
     ],

@@ -59,7 +59,7 @@ def test_an_outcome_that_nothing_gives_is_refused_with_its_line_and_what_there_i
 
 def test_an_outcome_that_is_named_twice_is_refused(tmp_path: Path) -> None:
     said = refusal(tmp_path, STUDY.replace("sparc", "circle_to_circle"))
-    assert "'circle_to_circle' stands there twice; once is enough" in said
+    assert "'circle_to_circle' is listed twice; list it once" in said
 
 
 @pytest.mark.slow

@@ -81,16 +81,16 @@ UNLIKE = [
         ([("movements: 2", "movements: 2, limit_s: 0.3")], "tasks.aiming.limit_s", "at full speed"),
         ([(BLOCK, BLOCK.replace(", pairs: 1", ""))], "design.order.pairs", "for pairs of 'aiming', so that they come as written, in one order for everybody"),
         ([("sessions:", "design: {order: {pairs: shuffled}}\nsessions:")], "sessions.1.steps.1.block.pairs",
-         "takes 1 of the 2 pairs of 'aiming', whose order is shuffled: each participant does another part"),
+         "takes 1 of the 2 pairs of 'aiming', whose order is shuffled: each participant does a different"),
         ([("sessions:", "design: {order: {pairs: {rule: shuffled, times: 2}}}\nsessions:"), ("pairs: 1", "pairs: 2")],
          "sessions.1.steps.1.block.pairs", "takes 2 of the 2 pairs"),
         ([("sessions:", "design: {order: {pairs: latin_square}}\nsessions:")], "sessions.1.steps.1.block.pairs", "whose order is latin_square"),
         # NASA-TLX has six answers; a repetition of this block has two trials, and an approach that is not counted.
         ([(BLOCK, BLOCK.replace("}", ", repeat: 26, ask: [nasa_tlx]}"))], "sessions.1.steps.1.block.ask",
          "6 answers after each of 52 trials are 312 in all; ask once, in a step of its own, or ask less"),
-        ([(BLOCK, BLOCK.replace("block", "practice"))], "sessions", "no session has a block, only practice, which counts for nothing"),
-        ([(BLOCK, BLOCK.replace("block", "reference"))], "sessions", "no session has a block, only reference, which"),
-        ([(BLOCK, "      - questionnaire: nasa_tlx\n")], "sessions", "no session has a block, so that a report has no result; write block"),
+        ([(BLOCK, BLOCK.replace("block", "practice"))], "sessions", "no session has a block, only practice, whose trials are not counted"),
+        ([(BLOCK, BLOCK.replace("block", "reference"))], "sessions", "no session has a block, only reference, whose"),
+        ([(BLOCK, "      - questionnaire: nasa_tlx\n")], "sessions", "no session has a block, so a report has no result; write block"),
         ([("movements: 2", "movements: 2, limit_s: 5e6")], "tasks.aiming.limit_s", "5e+06 s"),
         ([(BLOCK, f"{BLOCK}      - break: {{seconds: 3 days}}\n")],
          "sessions.1.steps.2.break.seconds", "a break of 72 hours"),
@@ -145,7 +145,7 @@ UNLIKE = [
         ([("sessions:", f"{NEAR}sessions:"), (BLOCK, BLOCK.replace("pairs", "feedback: group, pairs"))],
          "design.groups.heard", "in 'seen' alone people learn how far the tip is from the target, up to 4 m; in 'heard' alone people learn how far the tip is from the target, up to 0.3 m; the way"),
         ([("sessions:", f"feedback: {BOTH}\nsessions:"), (BLOCK, TWO_BLOCKS)], "sessions.1.steps.2.block",
-         "blocks at step 1 of 'only' and step 2 of 'only' are not told the same: in step 2 of 'only' alone people learn on which side the target is and whether the tip is inside the target; the way"),
+         "blocks at step 1 of 'only' and step 2 of 'only' do not give the same information: in step 2 of 'only' alone people learn on which side the target is and whether the tip is inside the target; the way"),
         ([("sessions:", "feedback: {ball: {use: sphere, smallest: 0.3, largest: 0.3, brightness: constant}}\nsessions:")], "feedback.ball.brightness",
          "smallest and largest are both 0.3 m, so that the sphere looks the same at every distance"),
         ([(BLOCK, BLOCK.replace("pairs", "ask: [nasa_tlx, nasa_tlx], pairs"))],
@@ -178,7 +178,7 @@ UNLIKE = [
          "sessions.1.steps.1.block.fading", "fades in 4 parts, over 3 trials"),
         ([("sessions:", BALL), (BLOCK, BLOCK.replace("pairs: 1", "pairs: 1, feedback: none, fading: [1, 0]"))],
          "sessions.1.steps.1.block.fading", "fades, and there is none"),
-        ([("machine: ch8", "operator: {use: dual_joystick}\nmachine: ch8")], "operator", "'dual_joystick', is a device that somebody moves"),
+        ([("machine: ch8", "operator: {use: dual_joystick}\nmachine: ch8")], "operator", "'dual_joystick', is a device that a person moves"),
         ([("sessions:", "feedback: {ball: {use: sphere, largest: 5}}\nsessions:")], "feedback.ball.largest", "is 5 m"),
         ([("sessions:", "feedback: {t: {use: sonification, pitch_hz: [220, 40_000]}}\nsessions:")], "feedback.t.pitch_hz", "not everybody hears"),
         ([("sessions:", "feedback: {t: {use: sonification, pitch_hz: [440, 440], overtones: [0, 0]}}\nsessions:")], "feedback.t.pitch_hz", "at every distance"),
@@ -450,7 +450,7 @@ def test_two_doubts_of_one_view_are_both_asked_and_answered_apart(tmp_path: Path
 def test_an_answer_to_nothing_is_told_with_the_nearest_question(tmp_path: Path) -> None:
     study = a_study(tmp_path, ("rate_hz: 240", "rate_hz: 10\nexpected: [rate_hs]"))
     assert [each.text for each in questions(study)][-1] == (
-        "expected has 'rate_hs', which nothing asks; did you mean 'rate_hz'?"
+        "expected: 'rate_hs' matches no warning; did you mean 'rate_hz'?"
     )
 
 

@@ -194,7 +194,11 @@ def test_the_study_of_these_mistakes_is_fine_without_them(tmp_path: Path) -> Non
         ("1m_far_left: 1", "1m_far_left: 2", "levels '1m_far_left' and '2m_far_left' are as hard"),
         ("up_down: {}", "carry: true", "neither is there; one of up_down and quest_plus"),
         ("up_down: {}", "up_down: {}\n      quest_plus: {spreads: [1]}", "both are there; one of"),
-        ("up_down: {}", "up_down: {}\n      start: 9m", "start is '9m', which is no level; there"),
+        (
+            "up_down: {}",
+            "up_down: {}\n      start: 9m",
+            "start is '9m', which is not a level; there",
+        ),
         ("up_down: {}", "up_down: {}\n      measure: error", "a measure has at_least, at_most"),
         (
             "up_down: {}",

@@ -150,7 +150,7 @@ def test_a_new_name_is_spelled_as_the_old_one_was(old: str, new: str, bids: str)
         ("p001", "p001 could be taken for P001, who is in the register"),
         ("P-001", "P-001 could be taken for P001"),
         ("P001-2", "P001-2 could be taken for P001"),
-        ("001", "'001' cannot be told from a number in a text"),
+        ("001", "'001' cannot be distinguished from an ordinary"),
         ("lpt1", "'lpt1' is a device on Windows; take another name"),
         ("Register", "'Register' is a word of labcrane's own files"),
         ("P001-PILOT", "ends in -PILOT, which labcrane puts there itself"),
@@ -264,7 +264,7 @@ def test_no_session_is_recorded_behind_a_link(tmp_path: Path) -> None:
     from labcrane.recording.data_folder import DataFolder
 
     assert study.protocol.study == "rehearsal"
-    with pytest.raises(RecordingError, match="is a link, and links are never followed"):
+    with pytest.raises(RecordingError, match="is a link, and erasing never follows links"):
         DataFolder(tmp_path, "P001", pilot=False, simulated=False).make()
 
 
