@@ -1,9 +1,9 @@
-"""Annotations: marks that people make in a recording afterwards, in a file of their own beside it.
+"""Annotations: notes that people add to a recording afterwards, in a file of their own next to it.
 
-``ses-01_annotations.jsonl`` lies in the participant's folder: it is erased, transferred and
-relabelled with the recordings, and outlives that the participant file is made anew of its journals.
-What was recorded is never touched. Nothing is ever taken out of the file: who takes a mark back
-adds a line that says so.
+``ses-01_annotations.jsonl`` is in the participant's folder. It is erased, transferred and
+relabelled with the recordings, and stays when the participant file is rebuilt from its journals.
+The recording itself is never changed. No line is ever removed from the file: withdrawing an
+annotation adds a line that says so.
 """
 
 import json
@@ -22,10 +22,10 @@ from labcrane.files.lock import held
 from labcrane.limits import LIMITS, LimitError, check_text
 
 PATIENCE_S = 5.0
-"""How long a mark waits for somebody who makes another one."""
+"""How long an annotation waits while another one is written, in seconds."""
 
 COLUMNS = ("time", "until", "text", "written")
-"""What there is of every mark: two times in seconds, and two texts."""
+"""Columns of every annotation: two times in seconds, and two texts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ def read_annotations(folder: Path, session: int) -> list[Annotation]:
     Raises
     ------
     RecordingError
-        The file cannot be read, or a line of it is no mark.
+        The file cannot be read, or one of its lines is not an annotation.
     """
     path = annotations_path(folder, session)
     marks: dict[int, Annotation] = {}
@@ -82,8 +82,8 @@ def read_annotations(folder: Path, session: int) -> list[Annotation]:
                 marks[number] = _annotation(said, number)
         except (ValueError, TypeError, LookupError) as error:
             raise RecordingError(
-                f"{path}, line {number} is no mark: {error!r}; correct it, and leave every line in "
-                "its place: marks are known by the numbers of their lines"
+                f"{path}, line {number} is not an annotation: {error!r}; correct it, and leave all "
+                "lines in their places: annotations are known by their line numbers"
             ) from error
     return sorted(marks.values(), key=lambda mark: (mark.time, mark.number))
 
@@ -134,12 +134,12 @@ def withdraw(recording: Path, session: int, number: int) -> None:
 
 
 def _append(recording: Path, session: int, said: dict[str, Any]) -> int:
-    """Write the file anew with one more line, and return which."""
+    """Rewrite the file with one more line, and return its number."""
     folder = _own_folder(recording)
     path = annotations_path(folder, session)
     lock = folder / f".{path.stem}.lock"
     try:
-        with held(lock, f"somebody else makes a mark in {folder}", PATIENCE_S):
+        with held(lock, f"another annotation in {folder} is being saved; try again", PATIENCE_S):
             there = read_annotations(folder, session)  # a file with a fault is not added to
             known = [mark.number for mark in there]
             if "withdraws" in said and said["withdraws"] not in known:
@@ -151,8 +151,8 @@ def _append(recording: Path, session: int, said: dict[str, Any]) -> int:
             write_text(path, "".join(f"{line}\n" for line in lines))
     except OSError as error:
         raise RecordingError(
-            f"cannot write {path}: {error.strerror}; what was recorded is as it was: look at a "
-            "copy of your own, or ask whoever looks after the data"
+            f"cannot write {path}: {error.strerror}; the recording is unchanged: work on your own "
+            "copy, or ask the administrator of the data"
         ) from error
     return len(lines)
 
@@ -163,23 +163,23 @@ def _own_folder(recording: Path) -> Path:
     if recording.stem != folder.name or not folder.is_dir():
         raise RecordingError(
             f"{recording} is not in its place, {recording.stem}/{recording.name} in a data folder, "
-            "and nobody would know of its marks when it is erased; make them there"
+            "so erasing the participant would miss its annotations; add them there"
         )
     if folder.is_symlink():
         raise RecordingError(
-            f"{folder} is a link, and links are never followed when somebody is erased; make the "
-            "marks in the folder itself"
+            f"{folder} is a link, and erasing never follows links; add the annotations in the "
+            "folder itself"
         )
     status = folder.stat()
     if sys.platform != "win32" and status.st_uid != os.geteuid():
         raise RecordingError(
-            f"{folder} belongs to somebody else (user {status.st_uid}), who could not change what "
-            "you write there; make the marks as that user"
+            f"{folder} belongs to another user ({status.st_uid}), who could not change what you "
+            "write there; add the annotations as that user"
         )
     if not os.access(folder, os.W_OK | os.X_OK):
         raise RecordingError(
-            f"{folder} can only be read, so no mark can be kept there; ask whoever looks after "
-            "the data to let you write"
+            f"{folder} is read-only, so annotations cannot be saved there; ask the administrator "
+            "of the data for write access"
         )
     return folder
 
@@ -198,7 +198,7 @@ def _lines(path: Path) -> Iterator[str]:
 def _mapping(line: str) -> dict[str, Any]:
     said = json.loads(line)
     if not isinstance(said, dict):
-        raise TypeError(f"{line[:40]!r} is no mapping of names")
+        raise TypeError(f"{line[:40]!r} is not a mapping of names")
     return said
 
 

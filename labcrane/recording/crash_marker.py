@@ -114,7 +114,7 @@ class CrashMarkerFile:
 def clear(path: Path) -> None:
     """Make room for the file of a session: of a process that died, and was read.
 
-    A link is removed, never what it leads to; a folder, which is nobody's mark, is moved aside.
+    A link is removed, never its target; a folder, which labcrane never writes, is moved aside.
     """
     if path.is_dir() and not path.is_symlink():
         path.rename(path.with_name(f"{path.name}.{os.getpid()}.aside"))
@@ -136,8 +136,8 @@ def read_number(path: Path) -> int | None:
 def read_crash_marker(path: Path) -> CrashMarker | None:
     """Return where a session is, or was when its process died; None when there is no file.
 
-    It explains an end, and nothing depends on it: one that is damaged, as a disk leaves it that
-    lost power or as somebody else wrote it, is said to be so.
+    It explains an end, and nothing depends on it. A file that a power loss or another program has
+    damaged is reported as damaged.
     """
     if not os.path.lexists(path):
         return None

@@ -319,7 +319,7 @@ def _told_once(
 def both_clocks(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return what two recorders of one computer logged of its clock, in order, each once.
 
-    Monotonic clocks begin anew with the computer: of two that cannot be one, the longer counts.
+    Monotonic clocks restart with the computer: of two logs that do not agree, the longer is used.
     """
     if not len(one) or not len(other):
         return one if len(one) else other

@@ -256,10 +256,10 @@ FRAMES = 4096
 
 
 class BatchLog(FrameLog):
-    """Writes what nobody would miss: a simulation that is killed is made again, to the same bits.
+    """Writes the frames of a simulation; one that is killed can be repeated, to the same bits.
 
-    So frames wait in memory for their chunk to be full, and nothing measures how long writing
-    takes. A disk that refuses ends the simulation.
+    So frames wait in memory until their chunk is full, and nothing measures how long writing takes.
+    An error of the disk ends the simulation.
     """
 
     def __init__(self, journal: SessionJournal, run: Run) -> None:

@@ -205,6 +205,6 @@ def _check(columns: Sequence[Column]) -> None:
         while parent:
             if parent in taken:
                 raise RecordingError(
-                    f"column {path!r} cannot stand below column {parent!r}; rename one of them"
+                    f"column {path!r} cannot be below column {parent!r}; rename one of them"
                 )
             parent = parent.rpartition(".")[0]

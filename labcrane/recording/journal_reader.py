@@ -14,7 +14,7 @@ from labcrane.recording.xdf.reader import XdfFile, XdfStream, read_xdf
 from labcrane.types import FloatArray
 
 UNREADABLE = "journal.unreadable"
-"""Name of an event whose text is no JSON: damaged in a part of the file that has no checks."""
+"""Name of an event whose text is not valid JSON: it was damaged where the file has no checks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ class SessionLog:
 
     @property
     def context(self) -> Mapping[str, Any]:
-        """What the first part says of the session; empty when it was killed before it did."""
+        """The session's description in the first segment; empty when it was killed before."""
         return next((event.data for event in self.events if event.name == START), {})
 
     @property

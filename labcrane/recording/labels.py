@@ -15,11 +15,11 @@ HED_VERSION = "8.3.0"
 """Version of the HED schema that the tags of labels are from."""
 
 LONGEST = 64
-"""Letters of a level; a longer text is no level, but a scene or a remark."""
+"""Most characters of a level; a longer text is not a level but a scene or a remark."""
 
 BLOCK = ("block", "block_name", "task", "practice")
 TRIAL = ("trial", "attempt", *BLOCK, "counted", "group", "reference")
-"""What every trial's event says beside the condition."""
+"""Keys of every trial's event in addition to the condition."""
 
 
 Attempt = tuple[object, object]
@@ -68,7 +68,7 @@ KNOWN: Mapping[str, Meaning] = {
         ("trial.end", "a trial ends", _STRUCTURE),
         ("break.start", "a break begins", _STRUCTURE),
         ("break.end", "a break ends", _STRUCTURE),
-        ("judgement.awaited", "the supervisor may judge the test that has ended", _CONTROL),
+        ("judgement.awaited", "the experimenter may judge the test that has ended", _CONTROL),
         ("judgement.over", "the test is judged, and the session goes on", _CONTROL),
         ("pause.start", "the machine is held at rest", _CONTROL),
         ("pause.end", "the session goes on", _CONTROL),
@@ -117,7 +117,7 @@ class Labels:
     Parameters
     ----------
     void
-        Trial and attempt of those that count for nothing, as far as that is known by now.
+        Trial and attempt of those that are not analysed, as far as that is known by now.
     unseen
         Those in which the operator was shown too little, as far as that is known.
     """
@@ -169,16 +169,16 @@ def labelled(
 ) -> list[str]:
     """Return the labels of a whole session's events, by name and data, in order.
 
-    Attempts that turned out to count for nothing are ``void`` from their start on, and those of
-    which the operator was shown too little are ``presentation_failed``.
+    Attempts that turned out not to be analysed are ``void`` from their start on, and those of which
+    the operator was shown too little are ``presentation_failed``.
 
     Parameters
     ----------
     events
         Name and data of each.
     failed
-        Whether that is so of an attempt (:func:`labcrane.analysis.presentation_failed`); None where
-        nobody has looked, as while a session runs.
+        Whether an attempt failed so (:func:`labcrane.analysis.presentation_failed`); None where
+        this was not examined, as while a session runs.
     """
     labels = Labels(void_attempts(events), {each for each, so in (failed or {}).items() if so})
     return [labels.of(name, data) for name, data in events]

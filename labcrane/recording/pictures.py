@@ -1,7 +1,7 @@
-"""Pictures of a view: the stream that says when each was shown, and over what their rate is.
+"""Pictures of a view: the stream of the times when each was shown, and the span of their rate.
 
-The examiner's lamp judges a view while a session runs, and the tables judge it afterwards. Both use
-this one number, so that they agree.
+The experimenter's status light rates a view while a session runs, and the tables rate it
+afterwards. Both use this one number, so that they agree.
 """
 
 LOG = "labcrane.feedback."

@@ -37,7 +37,7 @@ class RecordedFrames:
         self._first, self._rows = 0, np.empty((0, 0))
 
     def _rows_of(self, record: SessionRecord) -> "npt.NDArray[np.intp]":
-        """Return the row of the frame of each event; in each part of a session ticks begin anew."""
+        """Return the row of each event's frame; ticks restart in each part of a session."""
         events = record.events
         begins = events.groupby("part")["time"].first()
         first = dict(zip(begins.index, np.searchsorted(self.time, begins), strict=True))

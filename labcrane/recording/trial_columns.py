@@ -43,8 +43,8 @@ OWN = (
     Signal(
         "completion",
         "1",
-        definition="the examiner's flag: 1 where the trial was completed, 0 where not; NaN where "
-        "none was set",
+        definition="the experimenter's flag: 1 where the trial was completed, 0 where not; NaN "
+        "where none was set",
     ),
 )
 """Columns that a session may put into its trial table."""

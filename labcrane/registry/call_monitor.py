@@ -69,7 +69,7 @@ class CallMonitor:
     patience_s
         A call that takes longer is an overrun; a tick's period, once a session runs.
     overruns
-        By place; whoever tells of them takes them out.
+        By place; reporting them removes them.
     """
 
     def __init__(self) -> None:
@@ -186,7 +186,7 @@ class CallMonitor:
         Raises
         ------
         PluginError
-            It is no array of that shape, or holds what is no number.
+            It is not an array of that shape, or contains a value that is not a number.
         """
         array, float64 = self._arrays
         if (
@@ -224,7 +224,7 @@ class CallMonitor:
 def promised(
     called: str, signals: Sequence[Signal], method: Callable[[T], FloatArray], frame: T
 ) -> FloatArray:
-    """Return what a method of feedback or a cue says of a frame.
+    """Return the result of a method of feedback or a cue for a frame.
 
     Raises
     ------

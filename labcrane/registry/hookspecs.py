@@ -83,7 +83,7 @@ def labcrane_monitors() -> Sequence[Offer[SignalMonitor]]:
 
 @hookspec
 def labcrane_triggers() -> Sequence[Offer[Trigger]]:
-    """Offer lines by which other devices are told of events."""
+    """Offer lines that signal events to other devices."""
     raise NotImplementedError
 
 
@@ -202,7 +202,7 @@ ROLES: Mapping[type[Component], RoleEntry] = {
     Trigger: RoleEntry(
         labcrane_triggers,
         "trigger",
-        "a line by which other devices are told of events",
+        "a line that signals events to other devices",
         ("triggers",),
         several=True,
         returns={},

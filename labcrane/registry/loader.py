@@ -135,7 +135,7 @@ def own_plugins(study: Path) -> dict[str, Path]:
 
 
 class _Source(SourceFileLoader):
-    """A file that is compiled anew each time: what is approved byte by byte is what runs."""
+    """A file that is compiled each time it is loaded: exactly the approved bytes run."""
 
     def __init__(self, path: Path) -> None:
         # Two studies may each have an arrow.py.

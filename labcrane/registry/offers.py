@@ -97,8 +97,8 @@ def offer(
         inside it: every installed plugin is imported just to list offers.
     examine
         Called by ``labcrane doctor`` with validated settings, in a process of its own, and given
-        30 seconds: says how the hardware is that the component needs. With its second argument it
-        tells the person at the machine what to do; None when nobody is there.
+        30 seconds: returns the state of the hardware that the component needs. Its second argument
+        shows the person at the machine what to do; None when there is no person.
     needs
         Modules that a smaller installation may lack, and how to get each:
         ``{"pyserial": "pip install 'my-lamp[serial]'"}``. Checking a protocol says so, and nothing

@@ -73,7 +73,7 @@ class _Proxy(Component):
         return getattr(self.__dict__["_inner"], name)
 
     def watch(self, *, closely: bool = True) -> None:
-        """Set every method anew."""
+        """Wrap every method again."""
         for method, number in self._number.items():
             function = getattr(self._inner, method)
             call = self._call_monitor.watched(
@@ -94,10 +94,10 @@ class _Proxy(Component):
                 return None
 
     def _numbers(self, number: int) -> Callable[[FloatArray], None]:
-        """Return a check that values are what the signals promise, and numbers.
+        """Return a check that values match the declared signals and are numbers.
 
-        Most components fill one array anew on every tick: it is looked at whole once, and then
-        only whether its numbers are.
+        Most components fill the same array on every tick: the array is checked once, and then only
+        its numbers are.
         """
         isfinite = math.isfinite
         known: FloatArray | None = None

@@ -25,7 +25,7 @@ class Registry:
     Raises
     ------
     PluginError
-        Two plugins that were imported offer the same name: nobody could say which is meant.
+        Two plugins that were imported offer the same name, which is then ambiguous.
     """
 
     def __init__(self, modules: PluginModules) -> None:
@@ -85,7 +85,7 @@ class Registry:
         if imported := self._modules.load(names):
             for role in ROLES:
                 self._collect(role, imported)
-            # Whoever else offers the same is seen now, and not when that is looked for.
+            # Other plugins with the same names are found now, and not when a name is looked up.
             self._import({name for offers in self._offers.values() for name in offers})
 
     def _collect(self, role: type[Component], imported: Collection[str]) -> None:
@@ -128,6 +128,6 @@ def discover(plugins: Iterable[EntryPoint] | None = None, *, study: Path | None 
     Raises
     ------
     PluginError
-        Two plugins offer the same name, so that nobody could say which is meant.
+        Two plugins offer the same name, which is then ambiguous.
     """
     return Registry(PluginModules(plugins, study))

@@ -203,7 +203,7 @@ def tables(comparison: Comparison) -> list[tuple[str, list[list[str]]]]:
 
 
 def sentences(comparison: Comparison) -> list[str]:
-    """Return what a Methods section says of the comparison."""
+    """Return the sentences about the comparison for a Methods section."""
     names = " and ".join(each.engine for each in comparison.driven)
     first, *rest = comparison.driven
     same = all(each.trials == first.trials for each in rest)

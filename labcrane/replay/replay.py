@@ -105,8 +105,7 @@ def replay_session(
     sinks
         Called with every frame: whatever is to be measured now.
     run_code
-        Whether plugins that are in the recording are imported: they are programs of whoever made
-        the file.
+        Whether plugins in the recording are imported: they are programs of the file's author.
 
     Raises
     ------

@@ -40,8 +40,8 @@ def restored_study(
     protocol, machine
         Files to take instead of the recorded ones; plugins beside a given protocol are imported.
     run_code
-        Whether plugins of the study that are in the recording are imported as well. They are
-        programs of whoever made the file, so nothing but a person's own word asks for it.
+        Whether plugins of the study in the recording are imported as well. They are programs of the
+        file's author, so this needs the explicit request of a person.
 
     Raises
     ------
@@ -60,9 +60,9 @@ def restored_study(
             raise
         raise ProtocolError(
             f"{error}\nthe study had plugins of its own, {', '.join(code)}, whose code is in the "
-            "recording and is not run, since it may be anybody's: give the study's --protocol, "
-            "beside which they are; or read them (context: own_plugins), and if you trust whoever "
-            "made the file, give --run-recorded-code"
+            "recording and is not run, because its author is unknown: give the study's --protocol, "
+            "whose folder contains them; or read them (context: own_plugins) and, if you trust the "
+            "author of the file, use --run-recorded-code"
         ) from error
 
 

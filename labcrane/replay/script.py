@@ -38,7 +38,7 @@ REPORTS: Mapping[str, Callable[[Mapping[str, Any]], Message]] = {
 """The report of which an event tells, by the event's name."""
 
 
-class RecordOver(Exception):  # noqa: N818 - ends a loop, and is no error
+class RecordOver(Exception):  # noqa: N818 - ends a loop and is not an error
     """The last recorded tick has been run."""
 
 
@@ -118,4 +118,4 @@ class Script:
         return self._orders.get(self._tick, [])
 
     def report(self, event: Event) -> None:
-        """Nobody is told; the sinks see every event."""
+        """Do nothing: no person watches, and the sinks see every event."""

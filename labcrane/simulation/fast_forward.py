@@ -52,7 +52,7 @@ class FastForward:
     log
         Where the rows go.
     waiting
-        Whether somebody at the console wants something.
+        Whether an action waits at the console.
 
     Attributes
     ----------

@@ -44,7 +44,7 @@ def foreseen_tests(study: Study) -> pd.DataFrame:
 
 
 def _trials(study: Study) -> Iterator[dict[str, Any]]:
-    """Yield what the trial table says of each planned trial that counts."""
+    """Yield the row of the trial table of each planned trial that counts."""
     for slot, name in enumerate(planned_names(study), start=1):
         for number in range(1, len(study.protocol.sessions) + 1):
             plan = plan_session(study, name, number, slot)

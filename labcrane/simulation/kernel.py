@@ -59,7 +59,7 @@ def advance(
     read: Any, hands: FloatArray, inverse: Any, command: Any, scheme: FloatArray,
     step: Any, machine: FloatArray, evaluate: Any, task: FloatArray, changing: Places,
 ) -> int:  # fmt: skip
-    """Make ticks into ``rows`` until somebody declines one; return how many.
+    """Compute ticks into ``rows`` until a component declines one; return how many.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def advance(
         if refused == MADE:
             total = 0.0
             for k in range(places[AXES], places[TASK]):
-                total += row[k] * 0.0  # NaN for what is no number: the loop says whose it is
+                total += row[k] * 0.0  # NaN if one is not a number: the loop names its component
             refused = 0 if total == 0.0 else 1
         if refused != MADE:
             hands[:a], scheme[: b - a] = kept[:a], kept[a:b]

@@ -239,10 +239,10 @@ def _check_ends(population: Population, study: Study, source: YamlFile) -> None:
 
 
 def _ends(spread: Lognormal | Uniform) -> dict[str, float]:
-    """Return values that are drawn for certain, or come as near as one likes, by their keys.
+    """Return values that are certain to be sampled, or approached closely, by their keys.
 
-    A median stands for all of a lognormal one, whose tails have no end: what only a tail reaches
-    is told of whom it was drawn for.
+    A lognormal distribution is represented by its median, since its tails are infinite. A value of
+    a tail that is impossible is reported with the participant for whom it was sampled.
     """
     if isinstance(spread, Lognormal):
         return {"median": spread.median}
@@ -250,9 +250,9 @@ def _ends(spread: Lognormal | Uniform) -> dict[str, float]:
 
 
 def _impossible(study: Study, name: str, value: float) -> str:
-    """Return why the study's operator cannot be set so; nothing where it can.
+    """Return why the study's operator cannot have this setting; an empty text where it can.
 
-    What several settings ask of each other is not asked here: the others are drawn as well.
+    Rules between several settings are not checked here: the other settings are sampled as well.
     """
     settings = study.operator.settings
     try:
@@ -283,14 +283,14 @@ def _why_not(
         return f"{name!r} does not ask {asked!r}; {nearest(asked, items, 'it asks')}"
     if isinstance(spread, Shares):
         if item.kind != "choice":
-            return f"{asked!r} is no choice, but {item.takes}; say mean, sd, lowest and highest"
+            return f"{asked!r} is not a choice but {item.takes}; give mean, sd, lowest and highest"
         unknown = [choice for choice in spread.shares if choice not in item.choices]
         if unknown:
             there = ", ".join(item.choices)
             return f"{asked!r} has no choice {', '.join(unknown)}; it has {there}"
         return ""
     if item.kind not in {"scale", "number"}:
-        return f"{asked!r} is no number, but {item.takes}"
+        return f"{asked!r} is not a number but {item.takes}"
     if not item.lowest <= spread.lowest <= spread.highest <= item.highest:
         return (
             f"{asked!r} is from {item.lowest:g} to {item.highest:g}, not from {spread.lowest:g} to "
@@ -328,7 +328,7 @@ def _check_names(
         if name not in numbers:
             source.problem(
                 (*place, name),
-                f"{name!r} is no number that {study.operator.name!r} is set by; there is "
+                f"{name!r} is not a numeric setting of {study.operator.name!r}; there is "
                 f"{', '.join(numbers)}",
                 key=True,
             )

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 ALPHA = 0.05
 ROUNDING = 1e-12
-"""Standard error, as a share of the largest number, that is no spread of people."""
+"""Standard error, as a share of the largest number, that is rounding and not a spread of people."""
 _TERM = r"[a-z0-9_]+(?:\[T\.[^\]]+\])?"  # the second as a mixed model names the level of a factor
 _EFFECT = re.compile(
     rf"(log\()?([a-z0-9_]+)(\))?~({_TERM}(?::{_TERM})*)(?:\[(.+),(.+)\])?(?:=(.+))?"
@@ -63,7 +63,7 @@ def read_effect(text: str) -> Effect:
         found, size = None, None
     if found is None or bool(found[1]) != bool(found[3]):
         raise ProtocolError(
-            f"{text!r} is no effect; write MEASURE~FACTOR, log(MEASURE)~FACTOR, "
+            f"{text!r} is not an effect; write MEASURE~FACTOR, log(MEASURE)~FACTOR, "
             "MEASURE~FACTOR[WORD,WORD] or MEASURE~FACTOR=SIZE, as in movement_time~sequence=-0.1"
         )
     between = (found[5], found[6]) if found[5] else ()
@@ -155,8 +155,8 @@ class Pool:
     ----------
     means
         Participants' means at each level, shape ``(n_participants, n_levels)``; with groups,
-        shape ``(n_participants, 1)``. NaN for whoever is without a value at some level: they are
-        drawn as others are, and left out of the test, as people who drop out will be.
+        shape ``(n_participants, 1)``. NaN for participants without a value at some level: they are
+        sampled like others and excluded from the test, as people who drop out will be.
     weights
         How a participant's means make the number that is tested, shape ``(n_levels,)``: slope or
         difference.
@@ -185,10 +185,10 @@ def make_pool(
     Parameters
     ----------
     movements
-        Also those that are no results: whoever has no other is in the pool all the same.
+        Those without results included: participants who have no others stay in the pool.
     people
-        Everybody who began, and their group, for those who have no movement either; without it
-        those who have some.
+        All participants who began, and their group, including those without any movement; by
+        default, the participants with movements.
 
     Raises
     ------
@@ -426,15 +426,15 @@ def summarise(
     drawn: npt.NDArray[np.intp] | None,
     pool: int,
 ) -> Power:
-    """Return the power from what the tests said of each cohort, and of each where nothing is.
+    """Return the power from the tests of each cohort, with the effect and without it.
 
     Parameters
     ----------
     true
-        The effect that there is; 0 or NaN where nothing is to be said of exaggeration.
+        The true effect; 0 or NaN where exaggeration is not defined.
     drawn, pool
-        Who was drawn for each cohort, shape ``(cohorts, size)``, from how many participants; None
-        where nobody is in two cohorts.
+        The participants sampled for each cohort, shape ``(cohorts, size)``, and the size of the
+        pool; None where no participant is in two cohorts.
     """
     wrong = np.nan, np.nan
     if true and true == true and plain.estimates is not None and plain.found.any():  # noqa: PLR0124 - NaN is not itself
@@ -486,7 +486,7 @@ def _permuted(
     compared = labels >= 0
     by_chance = np.argsort(np.where(compared, random.random(labels.shape), 2.0), axis=1)
     places = np.argsort(~compared, axis=1, kind="stable")
-    mixed = labels.copy()  # whoever is of a third group stays there
+    mixed = labels.copy()  # participants of a third group stay there
     np.put_along_axis(mixed, places, np.take_along_axis(labels, by_chance, axis=1), axis=1)
     return means, mixed
 

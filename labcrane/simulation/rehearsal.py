@@ -50,7 +50,7 @@ HELD = 0.5
 devices, and sends."""
 
 FEWEST_TICKS = 100
-"""Ticks over which the time of one is told: the first ones are slow."""
+"""Fewest ticks from which the time of one is reported: the first ones are slow."""
 
 MOST_BEGUN = 200
 """Most participants whose trials are begun; more would take long and find little."""
@@ -68,7 +68,7 @@ class Rehearsed:
     sessions, trials
         How many were run.
     questions
-        What should be known of them: a trial that nobody could end, or that runs out of time.
+        Warnings about them: a trial that no participant could end, or that runs out of time.
     """
 
     sessions: int
@@ -191,15 +191,15 @@ def _step(study: Study, number: int, left: int) -> Place:
 
 
 def _cause(error: Exception) -> str:
-    """Return what an error says; of one that is nobody's words, what it is and where it arose."""
+    """Return the text of an error; for one that labcrane did not foresee, its type and place."""
     if isinstance(error, LabcraneError):
         return str(error)
     steps = extract_tb(error.__traceback__)
     at = f" ({Path(steps[-1].filename).name}:{steps[-1].lineno})" if steps else ""
     said = f"{type(error).__name__}: {error}".removesuffix(": ").replace("\n", " ")
     return (
-        f"it ends in {said}{at}, which is a fault of labcrane and not of yours; report it, with "
-        "the protocol, and change what stands here"
+        f"it ends in {said}{at}, which is a fault of labcrane, not of your protocol; report it with"
+        " the protocol, and change this part meanwhile"
     )
 
 
@@ -209,7 +209,7 @@ def _unplanned(study: Study, name: str, number: int, slot: int) -> Place:
     for at, step in enumerate(study.protocol.sessions[number - 1].steps):
         try:
             list(planner.steps(step))
-        except Exception:  # noqa: BLE001 - it was told, and its place is looked for
+        except Exception:  # noqa: BLE001 - it was reported; this finds its place
             return ("sessions", number - 1, "steps", at)
     return ("sessions", number - 1)
 
@@ -267,7 +267,7 @@ def _until_counted(trials: Sequence[Trial]) -> tuple[Trial, ...]:
 
 
 class _Examiner:
-    """Somebody who skips a trial that nobody ends, and remembers which."""
+    """Experimenter of a rehearsal: skips trials that do not end, and remembers them."""
 
     def __init__(self, study: Study, plan: SessionPlan) -> None:
         self._study, self._number = study, plan.number

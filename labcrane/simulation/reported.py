@@ -108,7 +108,7 @@ class PlannedTest:
 
 @dataclass(frozen=True, slots=True)
 class ReportedTest:
-    """What a test says of one cohort.
+    """Result of a test of one cohort.
 
     Attributes
     ----------
@@ -150,10 +150,10 @@ def plan_test(
     Parameters
     ----------
     movements
-        Of all participants, those that are no results included.
+        Movements of all participants, including those that are not results.
     people
-        Everybody who began, and their group, for those who have no movement either; without it
-        those who have some.
+        All participants who began, and their group, including those without any movement; by
+        default, the participants with movements.
 
     Raises
     ------
@@ -185,8 +185,8 @@ def plan_test(
     _check(planned)
     if np.isnan(ask(planned, planned.results).p):
         raise ProtocolError(
-            f"everybody together is no test of {effect.measure} over {effect.factor}; it needs "
-            "three or more participants with a value at every level, and not all alike"
+            f"cannot test {effect.measure} by {effect.factor} on the whole pool: three or more "
+            "participants need a value at every level, and the values must vary"
         )
     return planned
 
@@ -246,7 +246,7 @@ def column(factor: str, factors: Factors) -> str:
 
 
 def ask(planned: PlannedTest, results: "pd.DataFrame") -> ReportedTest:
-    """Return what the report's test says of some participants' movements."""
+    """Return the result of the report's test for some participants' movements."""
     return NOTHING if results.empty else ASKED[planned.kind](planned, results)
 
 
@@ -321,7 +321,7 @@ class Drawer:
         )
 
     def cohort(self, drawn: npt.NDArray[np.intp]) -> "pd.DataFrame":
-        """Return a cohort's movements; somebody who is drawn twice is two people."""
+        """Return a cohort's movements; a participant who is sampled twice is two people."""
         rows = [self._rows[at] for at in drawn.tolist()]
         cohort = self._planned.results.take(np.concatenate(rows)).reset_index(drop=True)
         numbers = np.repeat(np.arange(len(rows)), [len(own) for own in rows])
@@ -355,7 +355,7 @@ def power_of_report(
 ) -> Iterator[Power]:
     """Yield the power of the test for each size of the cohort.
 
-    A cohort follows from the seed, its size and its number, whoever makes it.
+    A cohort depends only on the seed, its size and its number, in whichever process it is sampled.
     """
     there, wanted = ask(planned, planned.results).estimate, planned.effect.size
     true = there if wanted is None else wanted
@@ -381,7 +381,7 @@ def power_of_report(
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """A cohort that was tested: who was drawn, and what the test says of it and of nothing."""
+    """A cohort that was tested: its participants, and the results with the effect and without."""
 
     drawn: npt.NDArray[np.intp]
     found: ReportedTest
@@ -405,10 +405,10 @@ def _chunk(
 
 
 def _found(planned: PlannedTest, cohort: "pd.DataFrame", by: float | None) -> ReportedTest:
-    """Return what the test says of a cohort in which the effect is larger by so much.
+    """Return the result of the test for a cohort in which the effect is larger by so much.
 
-    A contrast is corrected with all others of its factor, which the second level is part of: its
-    movements are moved. The other tests stand by themselves.
+    A contrast is corrected together with all others of its factor, which contain the second level:
+    the movements of that level are shifted. For the other tests, the result itself is shifted.
     """
     if by is None:
         return ask(planned, cohort)

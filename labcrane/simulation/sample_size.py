@@ -47,11 +47,11 @@ def sample_size(
     Raises
     ------
     ProtocolError
-        Not even :data:`MOST` participants have it, or it is no power.
+        Not even :data:`MOST` participants reach it, or it is not a power.
     """
 
     def at(size: int) -> Power:
-        # Seeded by the size, so that a size has one power whoever asks.
+        # Seeded by the size, so that a size always has the same power.
         (found,) = power(pool, effect, [size], cohorts, seed + size, claim=claim)
         return found
 
@@ -69,7 +69,7 @@ def smallest_cohort(power_of: Callable[[int], Power], goal: float) -> SampleSize
     Raises
     ------
     ProtocolError
-        Not even :data:`MOST` participants have it, or it is no power.
+        Not even :data:`MOST` participants reach it, or it is not a power.
     """
     if not ALPHA < goal < 1.0:
         raise ProtocolError(f"a power of {goal:g} cannot be aimed at; write 0.8 or 0.9")
@@ -118,7 +118,7 @@ def paragraph(
     test: str = "",
     recorded: bool = False,
 ) -> str:
-    """Return what an application to an ethics board says of the number of participants.
+    """Return the paragraph on the number of participants for an application to an ethics board.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def paragraph(
                 f"An effect that is found is then overstated by a factor of {found.type_m:.2f} on "
                 f"average, and has the wrong sign in {100 * found.type_s:.1f} % of cases."
             )
-    sentences.append("Participants are counted when they begin: whoever drops out is one of them.")
+    sentences.append("Participants are counted when they begin; those who drop out are included.")
     sentences.append(
         "A pilot is small: its own chance is in these numbers."
         if recorded

@@ -44,10 +44,10 @@ TRIALS = "_trials.parquet"
 """Behind a participant's name: a file of the trial table alone."""
 
 COUNTED = "counted"
-"""Column of what is said of a trial that the trial table, which has no other, leaves out."""
+"""Column that tells whether a trial counts; the trial table has only trials that do."""
 
 WAY = "simulated_by.json"
-"""In a participant's folder: by what each session was simulated, compiled twins or the loop."""
+"""In a participant's folder: how each session was simulated, by compiled kernels or the loop."""
 
 WORTH_LOADING = 200_000
 """Ticks of a simulation for which the loop takes longer than numba to load, about ten seconds."""

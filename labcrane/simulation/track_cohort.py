@@ -21,19 +21,20 @@ OPERATORS = 1000
 """By whom a recorded track is judged."""
 
 STEEPNESS = (0.5, 1.0, 2.0)
-"""Spreads by which a staircase, which says none itself, is judged: in mean steps of its levels."""
+"""Spreads with which a staircase, which has none of its own, is tested: in mean steps of its
+levels."""
 
 LEAST = 20
-"""Operators from whom bias and spread are told."""
+"""Fewest operators from whom bias and spread are reported."""
 
 END = 0.1
-"""Share of the operators at either end, of whom bias is told besides: a mean over everybody hides
-that thresholds near the easiest or the hardest level are taken for ones further in."""
+"""Share of the operators at either end, whose bias is reported separately: a mean over all hides
+that thresholds near the easiest or the hardest level are estimated too far from the end."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ability:
-    """How likely somebody's success is, as :class:`labcrane.protocol.tracks.QuestPlus` has it.
+    """Probability of success of an operator, as in :class:`labcrane.protocol.tracks.QuestPlus`.
 
     Attributes
     ----------
@@ -118,8 +119,8 @@ def abilities(
     spreads = spreads or (law.spreads if law is not None else ())
     if not spreads:
         raise ProtocolError(
-            f"track {track.name!r} is a staircase, and says nothing of how steeply success falls "
-            "with the level; give --spread, in the levels' unit"
+            f"track {track.name!r} is a staircase, which does not specify how steeply success "
+            "falls with the level; give --spread, in the levels' unit"
         )
     random = np.random.default_rng(seed)
     numbers = list(track.settings.levels.values())
@@ -184,7 +185,7 @@ def quality(track: PlannedTrack, found: "pd.DataFrame") -> TrackQuality:
 
 
 def paragraph(found: Sequence[TrackQuality]) -> str:
-    """Return what an application to an ethics board says of tracks."""
+    """Return the paragraph on tracks for an application to an ethics board."""
     sentences = []
     for each in found:
         none = f"; of {each.without} there was no estimate" if each.without else ""
@@ -208,7 +209,8 @@ def judged(name: str, described: str) -> "pd.DataFrame":
     Parameters
     ----------
     described
-        What a recording says of it, :attr:`labcrane.design.tracks.PlannedTrack.described` as JSON.
+        Its description in a recording, :attr:`labcrane.design.tracks.PlannedTrack.described`, as
+        JSON.
     """
     import pandas as pd
 

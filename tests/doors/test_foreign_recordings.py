@@ -135,7 +135,7 @@ def test_the_code_of_a_study_is_run_when_somebody_says_so(
         assert "'own_cue' is not installed" in said
         assert "the study had plugins of its own, plugins/own.py, whose code is in the" in said
         assert "recording and is not run" in said
-        assert "if you trust whoever made the file, give --run-recorded-code" in said
+        assert "if you trust the author of the file, use --run-recorded-code" in said
     assert main(["replay", str(own), "--run-recorded-code"]) == 0
     assert "every number the same bit for bit" in capsys.readouterr().out
     assert main(["replay", str(own), "--show", "--run-recorded-code"]) == 0

@@ -137,7 +137,7 @@ def test_a_line_that_is_no_mark_is_named_and_nothing_is_added_to_such_a_file(
         lambda: annotate(recording, 1, 2.0, "more"),
     ):
         with pytest.raises(
-            RecordingError, match=r"annotations\.jsonl, line 2 is no mark: .*; corr"
+            RecordingError, match=r"annotations\.jsonl, line 2 is not an annotation: .*; corr"
         ):
             work()
     assert path.read_bytes() == before
@@ -159,7 +159,7 @@ def test_a_copy_and_a_link_get_no_marks_because_no_erasure_would_find_them(
         other.symlink_to(recording.parent, target_is_directory=True)
     except OSError:
         pytest.skip("this system lets this user make no links")
-    with pytest.raises(RecordingError, match="is a link, and links are never followed"):
+    with pytest.raises(RecordingError, match="is a link, and erasing never follows links"):
         annotate(other / "P001.h5", 1, 1.0, "lost")
     assert [path.name for path in copy.parent.iterdir()] == ["P001.h5"]
 
@@ -171,17 +171,19 @@ def test_somebody_elses_folder_and_one_that_can_only_be_read_get_no_marks(
     owner = os.geteuid()
     with monkeypatch.context() as patched:
         patched.setattr(os, "geteuid", lambda: owner + 1)
-        with pytest.raises(RecordingError, match=rf"belongs to somebody else \(user {owner}\)"):
+        with pytest.raises(RecordingError, match=rf"belongs to another user \({owner}\)"):
             annotate(recording, 1, 1.0, "mine")
     with monkeypatch.context() as patched:
         # The system's own answer, which it gives nobody who may do everything.
         patched.setattr(os, "access", lambda *_: False)
-        with pytest.raises(RecordingError, match="can only be read, so no mark can be kept there"):
+        with pytest.raises(
+            RecordingError, match="is read-only, so annotations cannot be saved there"
+        ):
             annotate(recording, 1, 1.0, "mine")
     if owner != 0:
         recording.parent.chmod(0o500)
         try:
-            with pytest.raises(RecordingError, match="can only be read"):
+            with pytest.raises(RecordingError, match="is read-only"):
                 annotate(recording, 1, 1.0, "mine")
         finally:
             recording.parent.chmod(0o700)

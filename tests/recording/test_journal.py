@@ -59,7 +59,7 @@ def test_event_data_may_not_hide_name_and_tick() -> None:
         ([Column("eeg", "x", "V")], "the groups are loop, input"),
         ([Column("state", "a b", "1")], "not a dotted path"),
         ([Column("state", "a", "1"), Column("state", "a", "m")], "appears twice"),
-        ([Column("state", "a", "1"), Column("state", "a.b", "m")], "cannot stand below"),
+        ([Column("state", "a", "1"), Column("state", "a.b", "m")], "cannot be below"),
     ],
 )
 def test_columns_that_would_collide_in_the_participant_file_are_refused(

@@ -113,7 +113,7 @@ def test_a_lapse_delays_the_movement_by_as_much_as_it_lasts() -> None:
     [
         (
             "operator: {skill: {median: 1, log_sd: 0}}",
-            r":2:12: 'skill' is no number that 'simulated",
+            r":2:12: 'skill' is not a numeric setting of 'simulated",
         ),
         ("groups: {loud: {fitts_b_s: 2}}", r":2:10: there is no group 'loud'; there is none, slow"),
         ("operator: {lapse_s: {lowest: 2, highest: 1}}", r":2:30: .*lowest is 2, above highest, 1"),
@@ -254,9 +254,12 @@ def test_answers_are_drawn_from_the_distributions_that_are_written(asking: Study
         ),
         (
             "{person: {age: {shares: {male: 20}}}}",
-            "'age' is no choice, but 16 to 99 in steps of 1; say mean",
+            "'age' is not a choice but 16 to 99 in steps of 1; give mean",
         ),
-        ("{person: {gender: {lowest: 1, highest: 2}}}", "'gender' is no number, but one of female"),
+        (
+            "{person: {gender: {lowest: 1, highest: 2}}}",
+            "'gender' is not a number but one of female",
+        ),
         ("{person: {age: {lowest: 10, highest: 35}}}", "'age' is from 16 to 99, not from 10 to 35"),
         ("{person: {age: {lowest: 18.5, highest: 35}}}", "and 18.5 is none of them"),
         (

@@ -293,7 +293,7 @@ def test_effects_are_read_as_they_are_written(text: str, effect: Effect) -> None
 
 @pytest.mark.parametrize("text", ["movement_time", "log(x~y", "x~y=much", "~y"])
 def test_what_is_no_effect_is_refused_with_examples(text: str) -> None:
-    with pytest.raises(ProtocolError, match="is no effect; write MEASURE~FACTOR"):
+    with pytest.raises(ProtocolError, match="is not an effect; write MEASURE~FACTOR"):
         read_effect(text)
 
 
@@ -478,7 +478,7 @@ def test_the_paragraph_says_sizes_intervals_and_what_was_tested() -> None:
     assert "and of the 4000 participants they were drawn from" in text
     assert "movement_time~half was tested" in text
     assert "overstated by a factor of 1." in text
-    assert "Participants are counted when they begin: whoever drops out is one of them." in text
+    assert "Participants are counted when they begin; those who drop out are included." in text
 
 
 @pytest.mark.parametrize(

@@ -153,7 +153,7 @@ def test_the_command_tells_bias_and_spread_and_is_the_same_again(
 @pytest.mark.parametrize(
     ("text", "words", "message"),
     [
-        (STUDY, [], "track 'stairs' is a staircase, and says nothing of how steeply"),
+        (STUDY, [], "track 'stairs' is a staircase, which does not specify how steeply"),
         (STUDY, ["--spread", "0"], "--spread 0 is not a spread; give numbers above 0"),
         (STUDY.replace(", track: quest", "").replace(", track: stairs", ""), [], "has a track"),
         (

@@ -1,7 +1,7 @@
-"""About the file: a README, a description as JSON-LD and a citation, inside of it.
+"""Description of a participant file in the file itself: README, JSON-LD and citation.
 
-Whoever is handed one participant file, years later and without labcrane, finds out from it what it
-is and how it is opened.
+A reader who gets one participant file years later, without labcrane, learns from it what it is and
+how to open it.
 """
 
 import json
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 README, DESCRIPTION, CITATION = "README", "dataset_description", "CITATION"
 ABOUT = (README, DESCRIPTION, CITATION)
-"""Texts beside the sessions; made anew whenever the file is."""
+"""Texts next to the sessions; written again whenever the file is."""
 
 CITE = """\
 cff-version: 1.2.0

@@ -1,4 +1,4 @@
-"""Containment of a participant file: everything it holds lies in it, and is no larger than it."""
+"""Containment of a participant file: all its data are inside it, and none claims more than fits."""
 
 import math
 import os
@@ -126,8 +126,8 @@ def check_texts(file: "h5py.File", path: Path) -> None:
                     what = f"the text at byte {at} says it is {length} bytes long"
                 if wrong:
                     raise RecordingError(
-                        f"{path} is damaged: {what}; move it away, and labcrane recover "
-                        f"{path.parent} makes it anew of the journals, if they are there"
+                        f"{path} is damaged: {what}; move it elsewhere, then run labcrane "
+                        f"recover {path.parent} to rebuild it from the journals, if they exist"
                     )
 
 
@@ -192,7 +192,7 @@ def _found(data: BinaryIO, start: int, stop: int) -> Iterator[tuple[int, bytes]]
 
 
 def _attribute_length(begin: bytes) -> int:
-    """Return how many bytes a text takes by what is said of it; 0 if it is none."""
+    """Return the length of a text in bytes that its header states; 0 if it is not a text."""
     if len(begin) < _LONGEST:
         return 0
     space_at = _LENGTH_AT - len(_ONE_VALUE)
@@ -264,7 +264,7 @@ class _Walk:
 
         address = h5py.h5o.get_info(node.id).addr
         if address in self._seen:
-            raise self._refused(where, "is there twice, or holds itself")
+            raise self._refused(where, "is listed twice, or contains itself")
         self._seen.add(address)
 
     def _dataset(self, dataset: "h5py.Dataset", where: str) -> None:

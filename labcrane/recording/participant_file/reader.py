@@ -37,9 +37,9 @@ class Stream:
     Attributes
     ----------
     name
-        ``"state"``, or the name of a stream of others: ``"EEG"``.
+        ``"state"``, or the name of an external stream: ``"EEG"``.
     attrs
-        What the file says of it; for a corrected stream also how right its time is.
+        Its attributes in the file; for a corrected stream also the accuracy of its timestamps.
     """
 
     name: str
@@ -87,7 +87,7 @@ class Stream:
 
     @cached_property
     def time_uneven(self) -> FloatArray:
-        """The times without evening, in seconds, shape ``(n,)``; the same where nothing was."""
+        """The times before dejittering, in seconds, shape ``(n,)``; the same without it."""
         uneven = self._beside("time_uneven") if "rate_hz" in self.attrs else None
         return self.time if uneven is None else uneven
 
@@ -191,7 +191,7 @@ class Stream:
                 + ", ".join(self._paths)
             )
         first, last, _ = slice(start, stop).indices(len(self))
-        # Whoever reads whole chunks needs none twice, and what keeps them grows with the length.
+        # Reading whole chunks needs none twice, and a cache would grow with the length.
         with reading(self._path, cached=rows < CHUNK) as file:
             chosen = {"time": file[self._time]}
             chosen |= {name: file[self._paths[name]] for name in wanted}
@@ -252,7 +252,7 @@ class Stream:
 
     @cached_property
     def header(self) -> StreamHeader | None:
-        """What the source says of itself and its channels; None for the session's own signals."""
+        """Header of the source, with its channels; None for the session's own signals."""
         if "rate_hz" not in self.attrs:
             return None
         with reading(self._path) as file:
@@ -334,11 +334,11 @@ class SessionRecord:
 
     @property
     def annotations(self) -> "pd.DataFrame":
-        """One row per mark that people made afterwards: time, until, text and written.
+        """One row per annotation that people added afterwards: time, until, text and written.
 
-        Times are in seconds on the session's clock. They are read anew each time, from the file
-        beside the participant file (:mod:`labcrane.recording.annotations`): a participant file
-        that was copied elsewhere alone has none.
+        Times are in seconds on the session's clock. Each access reads them again, from the file
+        next to the participant file (:mod:`labcrane.recording.annotations`): a participant file
+        that was copied without it has none.
         """
         import pandas as pd  # noqa: PLC0415
 
@@ -413,7 +413,7 @@ class Recording:
     participant
         Pseudonym.
     attrs
-        What the file says of itself.
+        Attributes of the file.
     sessions
         Numbers of the sessions in it.
     """
@@ -471,7 +471,7 @@ def session_in(group: "h5py.Group") -> Iterator[SessionRecord]:
 def _mapping(text: str) -> dict[str, Any]:
     content = json.loads(text)
     if not isinstance(content, dict):
-        raise TypeError(f"{text[:40]!r} is no mapping of names")
+        raise TypeError(f"{text[:40]!r} is not a mapping of names")
     return content
 
 

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 
 def recorrect(path: Path, conclude: Conclude) -> dict[int, list[str]]:
-    """Write corrected times anew for every stream of every session; return which.
+    """Correct the times of every stream of every session again; return the streams by session.
 
-    The file is replaced by a new one in one step; raw stamps, probes and samples are copied as
-    they are.
+    The file is replaced by a new one in one step; raw timestamps, probes and samples are copied
+    unchanged.
 
     Raises
     ------

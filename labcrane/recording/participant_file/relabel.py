@@ -79,7 +79,7 @@ def relabel_journal(source: Path, target: Path, old: str, new: str) -> None:
 
 
 def _own(file: XdfFile) -> list[XdfStream]:
-    """Return the streams without the checks, which every writer makes anew."""
+    """Return the streams without the checks, which every writer computes itself."""
     return [stream for stream in file.streams if stream.header.name != CHECK_NAME]
 
 

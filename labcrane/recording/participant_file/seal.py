@@ -1,8 +1,8 @@
-"""Seal of a participant file: a sum of all its bytes that HDF5 keeps none of.
+"""Seal of a participant file: a checksum of all bytes that have none in HDF5.
 
-gzip adds a sum to every packed piece of a column, and HDF5 refuses a piece that does not fit its
-own. Short columns, texts, units and HDF5's own tables have none. Theirs stands behind the end of
-the file, where HDF5 does not look, and what changes the file with HDF5 cuts it off.
+gzip adds a checksum to every packed chunk of a column, and HDF5 refuses a chunk that does not match
+it. Short columns, texts, units and HDF5's own tables have none. Their checksum follows the end of
+the file, where HDF5 does not look; a program that changes the file with HDF5 cuts it off.
 """
 
 import struct
@@ -53,8 +53,9 @@ def check_seal(data: BinaryIO, path: Path, size: int, spans: Iterable[Span]) -> 
     within = ((start, min(stop, size - _SEAL.size)) for start, stop in spans)
     if expected is not None and sum_of(data, within) != expected:
         raise RecordingError(
-            f"{path} is damaged: its bytes are not those that were written; move it away, and "
-            f"labcrane recover {path.parent} makes it anew of the journals, if they are there"
+            f"{path} is damaged: its bytes are not those that were written; move it elsewhere, "
+            f"then run labcrane recover {path.parent} to rebuild it from the journals, "
+            "if they exist"
         )
 
 

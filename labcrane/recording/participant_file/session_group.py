@@ -61,7 +61,7 @@ def attributes(context: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _write_journals(group: "h5py.Group", journals: Sequence[JournalState]) -> None:
-    """Write what this session was made of, so that nobody has to make it twice."""
+    """Write which journals this session was built from, so that it is built from them only once."""
     write_texts(group, "name", [journal.name for journal in journals])
     for column in ("size", "samples", "torn", "damaged", "unchecked"):
         values = np.array([getattr(journal, column) for journal in journals], np.float64)
@@ -121,7 +121,7 @@ def _own_trial(event: LoggedEvent, otherwise: float) -> float:
 
 REPEATED = "repeated"
 CUT_OFF = frozenset({REPEATED, "ended", "interrupted"})
-"""Outcomes of attempts that are no result anyway."""
+"""Outcomes of attempts that are never a result."""
 
 
 def _trial_rows(log: SessionLog) -> list[Mapping[str, Any]]:
@@ -150,9 +150,9 @@ def _trial_rows(log: SessionLog) -> list[Mapping[str, Any]]:
 
 
 def _set_after(log: SessionLog) -> dict[tuple[object, object], int]:
-    """Return completion flags that the examiner set after a trial had ended, by trial and attempt.
+    """Return completion flags that were set after a trial had ended, by trial and attempt.
 
-    The row that the trial ended with stays in the events as it was.
+    The experimenter sets them. The row that the trial ended with stays unchanged in the events.
     """
     return {
         (event.data.get("trial"), event.data.get("attempt")): int(event.data["text"])

@@ -1,4 +1,4 @@
-"""Faults of signals in a participant file: when each was told, and which trials it touches."""
+"""Faults of signals in a participant file: when each was reported, and which trials it affects."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import h5py
 
 BEFORE_S = 5.0
-"""A fault may have begun so long before it was told: the trials of that time are flagged too."""
+"""A fault may begin so long, in seconds, before its report: the trials in between are flagged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class FaultTime:
     stream, channel, kind, message
         What, and where; the channel is empty for the whole stream.
     start, end
-        When it was told, and when it was told no more, in seconds on the session's clock; the end
+        When it was reported, and when its report ended, in seconds on the session's clock; the end
         is infinite when it lasted.
     """
 

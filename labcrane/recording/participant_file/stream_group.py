@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     import h5py
 
 TIME_COLUMNS = {"time": "s", "time_error": "s", "time_uneven": "s", "time_basis": "1"}
-"""What stands beside a stream's raw stamps once it is corrected, with units: when a sample was, on
-our clock; how far that may be off at 95 %; the same without evening; and what it rests on, a place
-in :data:`BASES`."""
+"""Columns next to a stream's raw timestamps once it is corrected, with units: the time of a sample
+on the recorder's clock; its uncertainty at 95 %; the time before dejittering; and the basis of the
+time, an index into :data:`BASES`."""
 
 BASES = ("probes", "arrivals", "nothing")
 

@@ -132,9 +132,9 @@ def consolidate(
 
 @contextmanager
 def renewed(path: Path, again: str) -> Iterator[Path]:
-    """Give a file beside a participant file to be written; it takes its place when it is whole.
+    """Give a new file next to a participant file; it replaces that file when it is complete.
 
-    Waits for whoever renews one in the same folder. May be killed at any moment.
+    Waits while another process renews one in the same folder. May be killed at any moment.
 
     Parameters
     ----------
@@ -218,9 +218,9 @@ def _write(beside: Path, path: Path, session: _Session, conclude: Conclude | Non
 
 
 def put_seal(path: Path) -> None:
-    """Seal a participant file that is written: what changes later by itself is then found.
+    """Seal a participant file that is written, so that later damage is found.
 
-    Whoever changes a copy with HDF5 takes its seal away, and calls this when it is as it shall be.
+    A program that changes a copy with HDF5 removes its seal, and calls this when it is finished.
     """
     import h5py  # noqa: PLC0415
 
@@ -236,7 +236,7 @@ def opened(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
     Parameters
     ----------
     cached
-        Whether chunks are kept, a megabyte for each column: for whoever reads parts of them.
+        Whether chunks are cached, a megabyte for each column: for reading parts of chunks.
 
     Raises
     ------
@@ -267,7 +267,7 @@ def opened(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
 
 @contextmanager
 def reading(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
-    """Open a participant file for reading alone: whatever is wrong with it is told in words.
+    """Open a participant file read-only; damage is reported with a remedy.
 
     ``cached`` is as for :func:`opened`.
 
@@ -286,8 +286,8 @@ def reading(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
     # h5py, numpy, pandas and json raise what they like of damaged files.
     except (*DAMAGED, MemoryError) as error:
         raise RecordingError(
-            f"{path} is damaged: {error!r}; move it away, and labcrane recover {path.parent} "
-            "makes it anew of the journals, if they are there"
+            f"{path} is damaged: {error!r}; move it elsewhere, then run labcrane recover "
+            f"{path.parent} to rebuild it from the journals, if they exist"
         ) from error
 
 
@@ -342,9 +342,9 @@ def _verify(beside: Path, path: Path, session: _Session) -> None:
                 f"{path} is left as it is: check the disk"
             )
         if path.exists():
-            anew = {session.group, *ABOUT}
+            written = {session.group, *ABOUT}
             with opened(path) as old:
-                check_copied(new, old, lambda name: re.split("[/@]", name)[0] in anew)
+                check_copied(new, old, lambda name: re.split("[/@]", name)[0] in written)
 
 
 def check_copied(new: "h5py.File", old: "h5py.File", leave: Callable[[str], bool]) -> None:

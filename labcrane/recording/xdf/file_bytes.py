@@ -11,7 +11,7 @@ from labcrane.errors import RecordingError
 
 WINDOW = 1 << 22
 BEHIND = WINDOW // 8
-"""Bytes before what is asked for: whoever compares a stretch with its check goes back to it."""
+"""Bytes kept before the requested ones: comparing a chunk with its check goes back to them."""
 
 
 class FileWindow(NamedTuple):

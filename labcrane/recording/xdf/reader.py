@@ -59,7 +59,7 @@ class XdfStream:
     _chunks: Sequence[Chunk]
 
     def blocks(self) -> Iterator[npt.NDArray[np.generic]]:
-        """Yield the numbers of all samples, read anew, in blocks of a few MB at most.
+        """Yield the numbers of all samples, read again, in blocks of a few MB at most.
 
         Each of shape ``(n, n_channels)``, in the stream's number format; none of a stream of texts.
         """
@@ -140,7 +140,7 @@ def read_xdf(path: Path) -> XdfFile:
     Raises
     ------
     RecordingError
-        The file cannot be opened, or is no XDF file.
+        The file cannot be opened, or is not an XDF file.
     """
     data = FileBytes(path)
     verdict = verify(data)

@@ -25,7 +25,7 @@ class MyPartSettings(Settings):
     """Red, green and blue, each 0 to 1."""
 
     def reveals(self) -> tuple[str, ...]:
-        # What it tells of the task's error: `labcrane check` asks who is given it. () for nothing.
+        # Facts about the task's error that it shows: `labcrane check` asks who gets it. () for none
         return ("how far the tip is from the target", "where the target is")
 
 

@@ -29,7 +29,7 @@ class MyPartSettings(Settings):
     """Distance of tip and target, in metres, from which on it is dark."""
 
     def reveals(self) -> tuple[Within, ...]:
-        # What it tells of the task's error: `labcrane check` asks who is given it. () for nothing.
+        # Facts about the task's error that it shows: `labcrane check` asks who gets it. () for none
         return (Within("how far the tip is from the target", self.far),)
 
 

@@ -18,11 +18,11 @@ class MyPartSettings(Settings):
     """Largest value that is believed, in the unit of the stream."""
 
     patience_s: PositiveFloat = 2.0
-    """How long a channel is beyond it until that is told, in seconds."""
+    """How long a channel is beyond it until that is reported, in seconds."""
 
 
 class MyPart(SignalMonitor):
-    """Tells channels of streams of the type ``Temperature`` that are beyond a limit for long."""
+    """Reports channels of streams of type ``Temperature`` that stay beyond a limit."""
 
     def __init__(self, settings: MyPartSettings) -> None:
         self._settings = settings
@@ -36,7 +36,7 @@ class MyPart(SignalMonitor):
         self._beyond = np.zeros(len(self._labels))  # samples in a row, per channel
 
     def look(self, times: FloatArray, samples: FloatArray) -> Sequence[SignalFault]:
-        for beyond in ~(np.abs(samples) <= self._settings.largest):  # also what is no number
+        for beyond in ~(np.abs(samples) <= self._settings.largest):  # NaN as well
             self._beyond = np.where(beyond, self._beyond + 1, 0)
         message = f"is beyond {self._settings.largest:g}: check the sensor"
         return [

@@ -1,4 +1,4 @@
-"""my_part: a line by which other devices are told of events."""
+"""my_part: a line that signals events to other devices."""
 
 from collections.abc import Sequence
 from pathlib import Path
