@@ -176,7 +176,7 @@ def check_size(size: int, kind: str, what: str = "") -> None:
     limit = LIMITS[kind]
     if size > limit.most:
         raise LimitError(
-            f"{what or f'a {kind}'} has {size} {limit.unit}; the most are {limit.most}"
+            f"{what or f'a {kind}'} has {size} {limit.unit}; the maximum is {limit.most}"
         )
 
 

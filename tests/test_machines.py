@@ -90,7 +90,7 @@ def test_a_machine_beside_the_study_is_read_in_degrees_and_gives_radians(tmp_pat
             "    range_deg:",
             "    rang_deg:",
             "digger.yaml:7:5: 'rang_deg' is not a key of joints[2]; did you mean 'range_deg'?\n"
-            "digger.yaml:7:5: joints[2] needs 'range_deg'; is it what 'rang_deg' is to be?",
+            "digger.yaml:7:5: joints[2] needs 'range_deg'; did you write it as 'rang_deg'?",
         ),
         (
             "    a: 3.0",
@@ -140,7 +140,7 @@ def test_a_machine_beside_the_study_is_read_in_degrees_and_gives_radians(tmp_pat
         (
             "    mass_kg: 9",
             "    mass_kg: .inf",
-            "digger.yaml:9:14: joints[2].mass_kg is .inf; it must be a number that is one: neither "
+            "digger.yaml:9:14: joints[2].mass_kg is .inf; it must be a finite number: neither "
             ".nan nor .inf",
         ),
     ],
@@ -160,7 +160,7 @@ def test_all_mistakes_are_told_at_once_in_the_order_of_the_file(tmp_path: Path) 
 
 def test_what_is_no_yaml_is_told_with_its_line(tmp_path: Path) -> None:
     said = complaint(tmp_path, GOOD.replace("    a: 3.0", "    a: [3.0"))
-    assert said.startswith("digger.yaml:6:8: '[' opens here and is not closed as it should be")
+    assert said.startswith("digger.yaml:6:8: '[' opens here and is not closed by ']'")
 
 
 def test_an_unknown_machine_is_refused_with_those_there_are() -> None:

@@ -14,12 +14,12 @@ SYNC_S = 1.0
 """Longest time, in seconds, that data wait for the disk: what a power cut can take."""
 
 REMEDIES = {
-    errno.ENOSPC: "free space on the disk, then go on",
-    errno.EDQUOT: "the disk quota is used up: free space, then go on",
-    errno.EFBIG: "the file may grow no further: go on in a new part",
+    errno.ENOSPC: "free space on the disk, then continue",
+    errno.EDQUOT: "the disk quota is used up: free space, then continue",
+    errno.EFBIG: "the file has reached its size limit: continue in a new segment",
     errno.EROFS: "the disk is read-only: check it, or record into another folder",
-    errno.ESTALE: "connect its disk again, or put its folder back: what comes meanwhile waits",
-    errno.EIO: "the disk fails: stop the session and save what is on it",
+    errno.ESTALE: "connect its disk again, or restore its folder: new data wait meanwhile",
+    errno.EIO: "the disk is failing: stop the session and save its data",
 }
 
 
@@ -157,10 +157,10 @@ class AppendFile:
     def _error(self, action: str, failure: OSError) -> RecordingError:
         remedy = REMEDIES.get(failure.errno or 0, "check the disk and the folder")
         if self._fd < 0:
-            remedy = "it has been closed: go on in a new part"
+            remedy = "it is closed: continue in a new segment"
         return RecordingError(
             f"cannot {action} {self.path}: {failure.strerror}; "
-            f"the {self.size} bytes before are in the file; {remedy}"
+            f"the {self.size} bytes before it are in the file; {remedy}"
         )
 
 
@@ -171,7 +171,7 @@ def _create(path: Path) -> int:
         fd = os.open(path, flags, PRIVATE_FILE)
     except FileExistsError as error:
         raise RecordingError(
-            f"{path} exists already and is not overwritten; go on in a new part"
+            f"{path} already exists and is not overwritten; continue in a new segment"
         ) from error
     except OSError as error:
         remedy = REMEDIES.get(error.errno or 0, "check that the folder exists and can be written")

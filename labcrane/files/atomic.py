@@ -55,8 +55,8 @@ def replacing(path: Path, mode: int = PRIVATE_FILE) -> Iterator[Path]:
         beside.replace(path)
     except OSError as error:
         raise RecordingError(
-            f"cannot write {path}: {error.strerror or error}; it is as it was: remove the cause, "
-            "and do it again"
+            f"cannot write {path}: {error.strerror or error}; it is unchanged: remove the cause, "
+            "then try again"
         ) from error
     finally:
         with suppress(OSError):  # there is no such folder, or the disk is gone

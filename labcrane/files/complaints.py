@@ -85,9 +85,9 @@ def told(
         if each["type"] == "missing" and (meant := _meant(each)):
             holder = named((*place, *loc[:-1]))
             said = (
-                f"there is no space behind the colon of {str(loc[-1])!r}; add one"
+                f"there is no space after the colon of {str(loc[-1])!r}; add one"
                 if meant.startswith(f"{loc[-1]}:")
-                else f"{holder} needs {str(loc[-1])!r}; is it what {meant!r} is to be?"
+                else f"{holder} needs {str(loc[-1])!r}; did you write it as {meant!r}?"
             )
             yield Complaint((*loc[:-1], meant), said, key=True)
             continue
@@ -210,7 +210,7 @@ WANTED = {
     "float_parsing": "a number",
     "bool_parsing": "true or false",
     "path_type": "the name of a file",
-    "finite_number": "a number that is one: neither .nan nor .inf",
+    "finite_number": "a finite number: neither .nan nor .inf",
 }
 """What each of pydantic's types is for people who write YAML."""
 
@@ -224,7 +224,7 @@ PATTERNS = {
     "^#[0-9a-fA-F]{6}$": "red, green and blue in hexadecimal, in quotation marks, as '#0d47a1'",
     "^[a-z][a-z0-9_-]*$": "lower-case letters, digits, hyphens and underscores, a letter first",
     "^[a-z][a-z0-9_]*$": "lower-case letters, digits and underscores, a letter first",
-    "^-?[a-z][a-z0-9_.]*$": "the name of an axis, as left.x, or -left.x to turn it round",
+    "^-?[a-z][a-z0-9_.]*$": "the name of an axis, such as left.x, or -left.x to reverse it",
 }
 """Patterns in words."""
 
@@ -277,7 +277,7 @@ def _no_key(key: str, model: type[BaseModel], place: Place, loc: Place) -> str:
     """Return that what holds a key has none of that name, and which it has."""
     inside, holder = _model_at(model, loc), named((*place, *loc))
     if inside is not None and not inside.model_fields:
-        return f"{key!r} is not a key of {holder}, which has none; leave it out"
+        return f"{key!r} is not a key of {holder}, which has no keys; remove it"
     there = suggestion(key, inside.model_fields if inside else (), "possible:")
     return f"{key!r} is not a key of {holder}; {there}"
 

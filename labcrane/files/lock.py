@@ -167,4 +167,4 @@ def alone_in(folder: Path, *, wait: bool = True) -> Iterator[None]:
             os.close(fd)
 
 
-BUSY = "another labcrane is at work in {}; wait for it, or give another folder"
+BUSY = "another labcrane process is working in {}; wait for it, or give another folder"

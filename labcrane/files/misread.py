@@ -35,14 +35,14 @@ def misread(error: MarkedYAMLError, text: str) -> tuple[Spot, str]:
     lines = text.split("\n")
     if "'\\t'" in problem:
         return (line, column), (
-            "there is a tab, which YAML does not take for indentation; write spaces, and set the "
+            "there is a tab, which YAML does not accept as indentation; use spaces, and set the "
             "editor to do so"
         )
     for number, each in enumerate(lines[:line], start=1):
         if found := _WIDE.match(each):
             return (number, found.end()), (
-                "there is a space of another kind, which YAML does not take for indentation, as "
-                "word processors write it; write plain spaces"
+                "there is a special space, as word processors insert it, which YAML does not "
+                "accept as indentation; use plain spaces"
             )
     if found := _DUPLICATE.search(problem):
         first = error.context_mark.line + 1 if error.context_mark else line
@@ -54,14 +54,14 @@ def misread(error: MarkedYAMLError, text: str) -> tuple[Spot, str]:
         opened, sign = _opened(text, error.context_mark.index)
         if sign:
             return opened, (
-                f"{sign!r} opens here and is not closed as it should be, by {CLOSING[sign]!r}; add "
-                f"that, or a comma, before what stands in line {line}"
+                f"{sign!r} opens here and is not closed by {CLOSING[sign]!r}; add that, or a "
+                f"comma, before the text in line {line}"
             )
     if (quote := _quoted_far(error, text, line)) is not None:
         return quote
     if (at := _without_space(lines, line)) is not None:
         spot, key = at
-        return spot, f"there is no space behind the colon of {key!r}; add one"
+        return spot, f"there is no space after the colon of {key!r}; add one"
     return (line, column), _plain(problem)
 
 

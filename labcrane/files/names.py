@@ -120,14 +120,14 @@ def misfit(name: str, *, person: bool = True) -> str | None:
         return f"has {len(name)} characters; take {LONGEST} at most"
     low = name.lower()
     if low in DEVICES:
-        return "is a device on Windows; take another name"
+        return "is a device name on Windows; use another name"
     if not person:
         return None
     if low in OURS:
-        return "is a word of labcrane's own files; take another name"
+        return "is reserved for labcrane's own files; use another name"
     for stamp in STAMPS:
         if low.endswith(f"-{stamp.lower()}"):
-            return f"ends in -{stamp}, which labcrane puts there itself; leave it out"
+            return f"ends in -{stamp}, which labcrane adds itself; remove it"
     return None
 
 

@@ -143,11 +143,11 @@ def in_unit(text: str, unit: str) -> float | None:
     except ValueError:
         return None
     asked = (
-        f"where {KINDS[unit]} is asked for; write a plain number, in {unit}, or {KINDS[unit]} with "
+        f"where {KINDS[unit]} is required; write a plain number, in {unit}, or {KINDS[unit]} with "
         f"its unit, as {EXAMPLES[unit]}"
     )
     if not _UNIT.fullmatch(of) or _MORE.search(of):
-        raise ValueError(f"{text!r} has no unit that is known, {asked}")
+        raise ValueError(f"{text!r} has no known unit, {asked}")
     if of.lower() == "fps" and unit in {"Hz", "1/s"}:  # of pictures, and not of feet
         return number
     return _converted(number, of, unit, text, asked)
@@ -162,7 +162,7 @@ def _converted(number: float, of: str, unit: str, text: str, asked: str) -> floa
     try:
         measured = units.parse_units(of.replace("°", "deg").replace("%", "percent"))
     except (ValueError, *failures) as error:  # as of "min 30"
-        raise ValueError(f"{text!r} has no unit that is known, {asked}") from error
+        raise ValueError(f"{text!r} has no known unit, {asked}") from error
     try:
         quantity = units.Quantity(number, measured)
         if _root(quantity.units) != _root(unit):
@@ -170,7 +170,7 @@ def _converted(number: float, of: str, unit: str, text: str, asked: str) -> floa
             raise ValueError(f"{text!r} is {next(kinds, 'something else')}, {asked}")
         return float(f"{quantity.to(unit).magnitude:.12g}")
     except failures as error:
-        raise ValueError(f"{text!r} has no unit that is known, {asked}") from error
+        raise ValueError(f"{text!r} has no known unit, {asked}") from error
 
 
 @cache

@@ -362,8 +362,8 @@ def _scalar(node: Any, *, recorded: bool) -> Any:
         raise _Misfit(f"holds a whole number of {node.bit_length()} bits; write less")
     if isinstance(node, str) and not recorded and (sign := foreign(node)) is not None:
         raise _Misfit(
-            f"holds the character U+{ord(sign):04X} in {str(node)[:40]!r}, which is no "
-            "writing; leave it out"
+            f"contains the character U+{ord(sign):04X} in {str(node)[:40]!r}, which is not "
+            "allowed; remove it"
         )
     for kind in (int, float, str):
         if isinstance(node, kind):
@@ -374,7 +374,7 @@ def _scalar(node: Any, *, recorded: bool) -> Any:
 
 @lru_cache(maxsize=64)
 def _load(text: str, name: str, *, recorded: bool = False) -> Any:
-    """Return what ruamel.yaml makes of a text, which nobody changes: a scene is read many times."""
+    """Return the data that ruamel.yaml reads; read-only and cached, as scenes are read often."""
     try:
         check_size(len(text), "YAML file", "it")
     except LimitError as error:
@@ -424,11 +424,11 @@ def _load(text: str, name: str, *, recorded: bool = False) -> Any:
 
 
 def _check_version(text: str, name: str, *, recorded: bool) -> None:
-    """Refuse a file that says that it is older YAML, which reads words and times as others."""
+    """Refuse a file of an older YAML version, which reads words and times differently."""
     if not recorded and (found := _OLD.match(text)):
         raise ProtocolError(
-            f"{name}:{_place_in(found[0])}: the file is to be read as YAML 1.1, in which no is "
-            "false and 1:30 is 90; leave this line out"
+            f"{name}:{_place_in(found[0])}: the file asks for YAML 1.1, in which no is false and "
+            "1:30 is 90; remove this line"
         )
 
 
@@ -466,8 +466,8 @@ def _plain(node: Any, name: str, *, recorded: bool = False) -> Any:
         left[0] -= 1
         if left[0] < 0 or depth > 2 * DEEPEST:
             raise ProtocolError(
-                f"{name} holds more than {MOST_VALUES} values, or itself, behind its aliases; "
-                "write fewer of them"
+                f"{name} contains more than {MOST_VALUES} values, or itself, through its aliases; "
+                "use fewer of them"
             )
         at: Any = None
         try:

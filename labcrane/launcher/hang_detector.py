@@ -39,5 +39,5 @@ class HangDetector:
         if not self._told and (where.tick >= 0 or still > HANG_S):
             self._told = True
             then = f"; after {patience:.0f} s its process is killed" if where.place else ""
-            self._say(f"the session has stood still for {still:.0f} s in {where}{then}")
+            self._say(f"the session has not advanced for {still:.0f} s in {where}{then}")
         return where.place is not None and still > patience

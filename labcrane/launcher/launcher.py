@@ -189,7 +189,7 @@ class Launcher:
     def _confirm(self, command: Command) -> None:
         """Record the stream that a person has confirmed, and note that in the record."""
         if self._recorder is None:
-            self._say("take: the study records no streams of others")
+            self._say("take: the study records no external streams")
             return
         try:
             what, which = self._recorder.confirm(command.text)

@@ -53,8 +53,8 @@ def pages(
     )
     if where.host not in LOOPBACK and order.certificate is None:
         say(
-            f"the pages are served on {where.host} without TLS: who listens on that network can "
-            "read along; give page: certificate and key"
+            f"the pages are served on {where.host} without TLS: others on that network can read "
+            "them; set page: certificate and key"
         )
     _check_logo(visit.study.path, where)
     handle = PageHandle(order, console.give, say, lambda: launcher.streams_status)
@@ -74,7 +74,9 @@ def _check_logo(protocol: Path, where: "PageSettings") -> None:
         return
     logo = protocol.parent / where.logo
     if not logo.is_file():
-        raise ProtocolError(f"there is no logo {str(logo)!r}; a path counts from the protocol")
+        raise ProtocolError(
+            f"there is no logo {str(logo)!r}; paths are relative to the protocol's folder"
+        )
     from labcrane.protocol.pages import MOST_LOGO
 
     if (size := logo.stat().st_size) > MOST_LOGO:
@@ -111,7 +113,7 @@ def _verdict(
     visit: "Visit", outcome: "Outcome | None", report: "SyncReport | None"
 ) -> tuple[str, str, str]:
     """Return how a run ended, in words, and what to do."""
-    again = f"go on with: {visit.resume_command}"
+    again = f"to continue, run: {visit.resume_command}"
     if outcome is None:
         return "bad", "The run ended with an error", "the terminal says which"
     if outcome.died is not None:
@@ -122,10 +124,14 @@ def _verdict(
     if report and report.interrupted:
         doubt += "; it was paused for a view or sound that had failed"
     if report and LEVELS[report.of_stamps.value] != "ok":
-        doubt += "; look at its time stamps"
+        doubt += "; check its timestamps"
     if outcome.owed:
         worst = "warn" if level == "ok" else level
-        return worst, f"The session is saved{doubt}, and not complete: {outcome.owed}", again
+        return (
+            worst,
+            f"The session is saved but incomplete{doubt}; remaining: {outcome.owed}",
+            again,
+        )
     return level, f"The session is complete and saved{doubt}", "see below" if doubt else ""
 
 

@@ -24,7 +24,8 @@ def find_machine(name: str, beside: Path | None = None) -> Path:
         if is_file(path):
             return path
         raise ProtocolError(
-            f"machine file {str(path)!r} does not exist; a path counts from the protocol's folder"
+            f"machine file {str(path)!r} does not exist; paths are relative to the protocol's "
+            "folder"
         )
     if name.endswith((".urdf", ".xml")):
         kind = "urdf" if name.endswith(".urdf") else "mjcf"

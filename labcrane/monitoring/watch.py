@@ -116,7 +116,7 @@ class WatchedInlet:
             try:
                 data, stamps = inlet.pull_chunk(0.0, MOST)
             except RuntimeError:  # lost, and not to be found again
-                self._trouble.append("has gone: start its program again")
+                self._trouble.append("is gone: restart its program")
                 return
             if len(stamps):
                 self._take(np.asarray(data), np.asarray(stamps), counter)
@@ -125,7 +125,7 @@ class WatchedInlet:
         try:
             self._signals = MonitoredStream(stream, self._builder.build(stream))
         except (LabcraneError, ValueError, ArithmeticError, LookupError, TypeError) as error:
-            self._trouble.append(f"its signal is not looked at: {error}")
+            self._trouble.append(f"its signal is not monitored: {error}")
 
     def _take(
         self,

@@ -96,7 +96,7 @@ def check_apart(register: Register, participant: str, instead_of: str = "") -> N
         if same or Mentions([known]).of(participant) or Mentions([participant]).of(known):
             raise ProtocolError(
                 f"participant {participant} could be taken for {known}, who is in the register: "
-                "they differ only in capitals, hyphens, or a part of their own; give another "
+                "they differ only in capitals or hyphens, or one contains the other; give another "
                 "pseudonym"
             )
 
@@ -167,10 +167,10 @@ def waive(places: Places, participant: str, session: int, reason: str, today: da
 
 
 def check_words(text: str, what: str) -> None:
-    """Refuse words that lead to a person, or none at all."""
+    """Refuse an empty text, and one that could identify a person."""
     if not text.strip():
-        raise ProtocolError(f"a {what} needs words; say it without names")
+        raise ProtocolError(f"a {what} cannot be empty; write it without names")
     if found := personal(text):
         raise ProtocolError(
-            f"the {what} holds {found}, which would lead to a person; write it without"
+            f"the {what} contains {found}, which could identify a person; remove that"
         )

@@ -198,8 +198,8 @@ class Register(Record):
         for stone in self.tombstones:
             if stone.participant == participant:
                 raise ProtocolError(
-                    f"participant {participant} was erased on {stone.date}; nothing can be said "
-                    "of them any more"
+                    f"participant {participant} was erased on {stone.date}; nothing more can be "
+                    "recorded about them"
                 )
         known = ", ".join(sorted(self.participants)) or "nobody"
         raise ProtocolError(f"participant {participant} is not in the register; it has {known}")
@@ -261,10 +261,7 @@ def struck(places: Places) -> "dict[str, Struck]":
 
 
 def _damaged(places: Places, why: str) -> str:
-    return (
-        f"the register {places.register} is damaged: {why}; restore it from a backup, labcrane "
-        "never leaves it like this"
-    )
+    return f"the register {places.register} is damaged: {why}; restore it from a backup"
 
 
 def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -52,7 +52,7 @@ def begin(places: Places, old: str, new: str, reason: str, today: date) -> None:
         check_name(new, "participant")
         if old == new or not re.fullmatch(register.pattern, new):
             raise ProtocolError(
-                f"{old} cannot become {new!r}: it takes another pseudonym that matches "
+                f"{old} cannot become {new!r}: give another pseudonym that matches "
                 f"{register.pattern!r}"
             )
         if any(stone.participant == new for stone in register.tombstones):

@@ -129,7 +129,7 @@ class ProcessHandle:
             return f"its process ended with exit code {code}"
         silent = time.monotonic() - self._present.heard
         patience = self._patience.silent_s if self.ready else self._patience.start_s
-        return f"it has not been heard of for {silent:.0f} s" if silent > patience else None
+        return f"it has not responded for {silent:.0f} s" if silent > patience else None
 
     def tell(self, message: object) -> None:
         """Tell the process something, without waiting for it; nobody hears it when it has died."""

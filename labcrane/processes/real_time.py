@@ -166,5 +166,7 @@ else:
 
 def _said_of(core: int | None) -> str:
     return (
-        "any, and shared" if core is None else f"core {core}, which labcrane's others leave alone"
+        "any, and shared"
+        if core is None
+        else f"core {core}, which other labcrane processes do not use"
     )

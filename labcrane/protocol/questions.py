@@ -228,7 +228,7 @@ def _of_pattern(study: Study) -> Doubts:
             f"participant{'s' if planned > 1 else ''}, so that plans and simulations can name none",
         )
     if len(re.findall(r"(?<!\\)\{", pattern)) != len(re.findall(r"(?<!\\)\}", pattern)):
-        yield place, f"the pattern '{pattern}' has a brace that stands alone"
+        yield place, f"the pattern '{pattern}' has an unpaired brace"
 
 
 def _of_repeats(study: Study) -> Doubts:
@@ -378,9 +378,9 @@ def _of_the_operator(study: Study) -> Iterator[CheckQuestion]:
         yield CheckQuestion(
             "operator",
             place,
-            f"the operator, {study.operator.name!r}, who stands in for the input when nobody is "
-            f"there, has no {', '.join(lacks)}, so that the study can be neither simulated nor "
-            "rehearsed; is that meant?",
+            f"the operator, {study.operator.name!r}, which replaces the input in simulations, has "
+            f"no {', '.join(lacks)}, so the study can be neither simulated nor rehearsed; is that "
+            "meant?",
         )
 
 
@@ -395,7 +395,7 @@ def _of_the_loop(study: Study) -> Doubts:
     if rate > FASTEST_HZ:
         yield ("rate_hz",), f"rate_hz is {rate:g} Hz, and few computers hold more than 1000 Hz"
     elif rate < SLOWEST_HZ:
-        yield ("rate_hz",), f"rate_hz is {rate:g} Hz, at which a movement is seen to jump"
+        yield ("rate_hz",), f"rate_hz is {rate:g} Hz, at which movements appear to jump"
 
 
 def _blocks(study: Study) -> Iterator[tuple[Place, Block]]:
@@ -463,15 +463,15 @@ def _of_slow_views(study: Study) -> Doubts:
         if rate is not None and rate < least:
             yield (
                 ("views", name, "rate_hz"),
-                f"view {name!r} shows {rate:g} pictures a second, and presented asks for "
-                f"{least:g}, so that no movement counts; write presented: {{min_hz: {rate / 2:g}}}",
+                f"view {name!r} shows {rate:g} pictures a second, but presented requires "
+                f"{least:g}, so no movement counts; write presented: {{min_hz: {rate / 2:g}}}",
             )
     if limits.max_gap_s > RATE_S and operators_views(views):
         yield (
             ("presented", "max_gap_s"),
-            f"presented allows {limits.max_gap_s:g} s without a picture, and min_hz asks for "
-            f"pictures in every {RATE_S:g} s, so that {RATE_S:g} s without one leaves a movement "
-            f"out; write presented: {{max_gap_s: {RATE_S:g}}}",
+            f"presented allows {limits.max_gap_s:g} s without a picture, but min_hz requires "
+            f"pictures in every {RATE_S:g} s, so {RATE_S:g} s without one excludes a movement; "
+            f"write presented: {{max_gap_s: {RATE_S:g}}}",
         )
 
 
@@ -704,7 +704,7 @@ def _of_sessions(study: Study) -> Doubts:
     for number, session in enumerate(study.protocol.sessions):
         place: Place = ("sessions", number)
         if number == 0 and session.after_days is not None:
-            yield (*place, "after_days"), "after_days of the first session counts from no other"
+            yield (*place, "after_days"), "after_days of the first session has no session before it"
         long = 0.0
         for at, step in enumerate(session.steps):
             if step.kind == "break" and step.seconds > LONGEST_BREAK_S:
@@ -781,7 +781,7 @@ def _of_what_is_scored(study: Study) -> Doubts:
                 yield (
                     (*place, "task"),
                     f"{here} is scored against the operator's own reference time{of}, which no "
-                    "step before it takes, so that labcrane score leaves its tests out; write "
+                    "earlier step measures, so labcrane score leaves its tests out; write "
                     f"reference: {{task: {block.task}}} before it",
                 )
             steps = study.protocol.sessions[int(place[1])].steps[int(place[3]) + 1 :]
@@ -1009,7 +1009,7 @@ def _of_streams(study: Study) -> Doubts:
     for label, need in study.protocol.streams.items():
         of = (need.type, need.name, need.source_id)
         if "" in of:
-            yield ("streams", label), f"streams: {label} is asked for by an empty text"
+            yield ("streams", label), f"streams: {label} is identified by an empty text"
         written = usual.get((need.type or "").lower(), need.type)
         if written != need.type:
             yield (

@@ -73,8 +73,8 @@ class StreamNeed(Settings):
             raise ValueError("a stream needs a type, a name or a source_id to be found by")
         if self.evening == "forbid" and self.min_delay_s is not None:
             raise WrongKey(
-                "min_delay_s finds the samples that were delayed least, which is evening; leave it "
-                "out, or do not forbid evening",
+                "min_delay_s needs dejittering, to find the least delayed samples; remove it, or "
+                "do not write evening: forbid",
                 at=("min_delay_s",),
             )
         return self

@@ -342,7 +342,7 @@ class Checker:
         """Note a block of more trials than anybody does, which no plan could hold."""
         count = trials_of(block, self._protocol, task)[0]
         if count > MOST_TRIALS and not self._source.recorded:
-            message = f"the block has {count:.0f} trials; the most are {MOST_TRIALS}: repeat less"
+            message = f"the block has {count:.0f} trials; the maximum is {MOST_TRIALS}: repeat less"
             self._source.problem(place, message)
 
     def _limits(self, place: Place, limits: Mapping[str, object], task: Task) -> None:

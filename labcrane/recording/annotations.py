@@ -106,16 +106,16 @@ def annotate(
         It cannot be written there, or is none; what there was is as it was.
     """
     if not text.strip():
-        raise RecordingError("a mark needs words; say what is to be seen there")
+        raise RecordingError("an annotation cannot be empty; describe what it marks")
     try:
         check_text(text, "note")
     except LimitError as error:
-        raise RecordingError(f"a mark is a note, and {error}") from error
+        raise RecordingError(f"an annotation is a note, and {error}") from error
     end = time if until is None else until
     if not (math.isfinite(time) and math.isfinite(end) and end >= time):
         raise RecordingError(
-            f"a mark cannot last from {time:g} to {end:g} s; give a time, and an end that is not "
-            "before it"
+            f"an annotation cannot last from {time:g} to {end:g} s; give a time, and an end that "
+            "is not before it"
         )
     said = {"time": time, "until": end, "text": text.strip(), "written": _now()}
     number = _append(recording, session, said)
@@ -144,7 +144,7 @@ def _append(recording: Path, session: int, said: dict[str, Any]) -> int:
             known = [mark.number for mark in there]
             if "withdraws" in said and said["withdraws"] not in known:
                 raise RecordingError(
-                    f"{path} has no mark {said['withdraws']}; it has "
+                    f"{path} has no annotation {said['withdraws']}; it has "
                     + (", ".join(map(str, sorted(known))) or "none")
                 )
             lines = [*_lines(path), json.dumps(said, ensure_ascii=False)]

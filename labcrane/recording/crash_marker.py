@@ -76,7 +76,7 @@ class CrashMarker:
 
     def __str__(self) -> str:
         if self.damaged is not None:
-            return f"a place that is not known any more, since {self.damaged} is damaged"
+            return f"an unknown place, because {self.damaged} is damaged"
         when = "before the first tick" if self.tick < 0 else f"tick {self.tick}"
         return f"{self.place or 'labcrane itself'}, {when}"
 

@@ -206,14 +206,14 @@ class FrameLog:
     def _too_many(self) -> str:
         return (
             f"{len(self._waiting)} frames and events wait for the disk, and no more can: "
-            f"{self.trouble}; the session ends, mend the disk and go on with labcrane resume"
+            f"{self.trouble}; the session ends: repair the disk, then run labcrane resume"
         )
 
     def _not_written(self, lost: int) -> str:
         if self._over:
-            return f"{self._over}; what came before is in {self._journal.path}"
+            return f"{self._over}; the earlier data are in {self._journal.path}"
         return (
-            f"{lost} frames and events could not be written: {self.trouble}; what came before is "
+            f"{lost} frames and events could not be written: {self.trouble}; the earlier ones are "
             f"in {self._journal.path}"
         )
 

@@ -99,7 +99,7 @@ KNOWN: Mapping[str, Meaning] = {
         ),
         ("deformity.found", "a deformity that is there is reported", "Measurement-event"),
         ("questionnaire.start", "a questionnaire is asked", "Sensory-event", "Instructional"),
-        ("questionnaire.end", "a questionnaire is handed in", "Agent-action"),
+        ("questionnaire.end", "a questionnaire is submitted", "Agent-action"),
         ("input.lost", "the operator's controls are lost", _CONTROL),
         ("input.back", "the operator's controls are back", _CONTROL),
     )

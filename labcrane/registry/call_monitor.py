@@ -201,12 +201,12 @@ class CallMonitor:
             raise PluginError(self.complaint(number, f"returned {wrong}"))
 
     def _wrong(self, values: FloatArray, layout: Layout, *, finite: bool) -> str:
-        """Return what is wrong with what a method returned; empty when nothing is."""
+        """Return the mistake in the values that a method returned; empty when there is none."""
         array, float64 = self._arrays
         if type(values) is not array or values.dtype != float64:
-            return f"{getattr(values, 'dtype', type(values).__name__)}, and not an array of float64"
+            return f"{getattr(values, 'dtype', type(values).__name__)}, not an array of float64"
         if values.shape != (layout.size,):
-            return f"shape {values.shape}, and its signals promise ({layout.size},)"
+            return f"shape {values.shape}, but its signals need ({layout.size},)"
         pairs = zip(layout.columns, values.tolist(), strict=True)
         return ", ".join(f"{name} {x}" for name, x in pairs if finite and not math.isfinite(x))
 
@@ -236,8 +236,8 @@ def promised(
     shape = getattr(values, "shape", type(values).__name__)
     if shape != (size,):
         raise PluginError(
-            f"{called} returned shape {shape} from {method.__name__}() ({_source(method)}), and "
-            f"its signals promise ({size},)"
+            f"{called} returned shape {shape} from {method.__name__}() ({_source(method)}), but "
+            f"its signals need ({size},)"
         )
     return values
 

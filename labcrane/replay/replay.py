@@ -116,11 +116,13 @@ def replay_session(
     """
     record = open_recording(path).session(session)
     if speed is not None and not speed > 0.0:
-        raise ProtocolError(f"a speed of {speed:g} shows nothing; give one above 0, as 2 for twice")
+        raise ProtocolError(
+            f"a speed of {speed:g} shows nothing; give one above 0, such as 2 for double speed"
+        )
     if (runs := int(record.events["part"].max())) > 1:
         raise RecordingError(
-            f"session {session} of {path} was run in {runs} pieces; the state at a resumption is "
-            "not part of the input, so only sessions of one piece can be replayed"
+            f"session {session} of {path} was run in {runs} parts; the state at a resumption is "
+            "not part of the input, so only sessions without interruption can be replayed"
         )
     with TemporaryDirectory(prefix="labcrane-replay-") as folder:
         study = restored_study(record, Path(folder), protocol, machine, run_code=run_code)

@@ -94,7 +94,7 @@ class FastForward:
         twins = {name: part.twin() for name, part in parts.items()}
         found = {name: twin for name, twin in twins.items() if twin is not None}
         if missing := [name for name in twins if name not in found]:
-            return SimulatedBy(compiled=False, why=f"{', '.join(missing)} has no compiled twin")
+            return SimulatedBy(compiled=False, why=f"{', '.join(missing)} has no compiled kernel")
         self._advance = advance
         operator, scheme, dynamics, *tasks = found.values()
         self._twins = (operator, scheme, dynamics)

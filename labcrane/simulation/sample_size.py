@@ -158,8 +158,9 @@ def paragraph(
             )
     sentences.append("Participants are counted when they begin; those who drop out are included.")
     sentences.append(
-        "A pilot is small: its own chance is in these numbers."
+        "A pilot is small, so these numbers include its own sampling error."
         if recorded
-        else "The simulated operators are a model; the numbers hold for people as far as they do."
+        else "The simulated operators are a model; the numbers hold for people only as far as the "
+        "model does."
     )
     return " ".join(sentences)

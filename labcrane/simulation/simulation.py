@@ -290,7 +290,10 @@ def _too_short(study: Study, participant: str) -> str:
     expected = round(seconds * study.protocol.rate_hz)
     if expected >= WORTH_LOADING:
         return ""
-    return f"twins are loaded for {WORTH_LOADING:,} ticks or more, and {expected:,} are expected"
+    return (
+        f"compiled kernels are loaded for {WORTH_LOADING:,} ticks or more, and {expected:,} are "
+        "expected"
+    )
 
 
 def _check_same(order: SimulationJob, study: Study) -> None:

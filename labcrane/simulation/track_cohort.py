@@ -198,7 +198,8 @@ def paragraph(found: Sequence[TrackQuality]) -> str:
             f"{each.bias_highest:.3g} in that with the highest."
         )
     sentences.append(
-        "The simulated operators are a model; the numbers hold for people as far as they do."
+        "The simulated operators are a model; the numbers hold for people only as far as the model "
+        "does."
     )
     return " ".join(sentences)
 

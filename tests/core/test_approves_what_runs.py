@@ -329,7 +329,7 @@ def test_several_quantities_named_tuples_and_pictures_a_second_are_understood(se
 
 @pytest.mark.parametrize("text", ["1 min 30", "1 min 30 cm", "1 min 30 parsnips"])
 def test_what_is_no_quantity_is_told_in_our_words(text: str) -> None:
-    with pytest.raises(ValueError, match="a time is asked for; write a plain number, in s"):
+    with pytest.raises(ValueError, match="a time is required; write a plain number, in s"):
         in_unit(text, "s")
 
 

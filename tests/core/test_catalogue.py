@@ -37,7 +37,7 @@ JARGON = re.compile(
 """Words of programmers."""
 
 REMEDY = re.compile(
-    r"; |must be|did you mean|is it what|there is no .*; |needs |possible:|is that meant"
+    r"; |must be|did you mean|did you write|there is no .*; |needs |possible:|is that meant"
 )
 MISSPELT = "key misspelt as "
 NEAR = 4

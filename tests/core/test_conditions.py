@@ -142,7 +142,7 @@ def test_a_mistake_is_named_with_what_to_write(text: str, said: str, tmp_path: P
         (written("{ball: [ball], tone: [aside]}").replace("design:", f"{ASIDE}design:", 1),
          "conditions 'ball' and 'tone' do not give the same information: in 'tone' alone people"),
         (written("{plain: none, also: []}"), "'plain' and 'also' are given the same feedback"),
-        (written(order=""), "conditions come in one order for everybody and what they do"),
+        (written(order=""), "conditions come in one order for everybody and their effect"),
     ],
 )  # fmt: skip
 def test_a_design_that_cannot_tell_its_conditions_apart_is_asked_about(

@@ -128,7 +128,7 @@ def test_nothing_is_taken_where_no_streams_are_recorded(tmp_path: Path) -> None:
     visit = visit_of(protocol, "P001", 1, tmp_path, simulated=True, feedback=False)
     console.give(Command(Order.TAKE, "eeg"))
     assert Launcher(visit, console, said.append)._orders() == []
-    assert said == ["take: the study records no streams of others"]
+    assert said == ["take: the study records no external streams"]
 
 
 STOPS_BUT_HANGS_AS_A_SPARE = """

@@ -115,7 +115,7 @@ def test_a_mistake_is_told_with_its_line(complaint, old: str, new: str, said: st
     ("old", "new", "said"),
     [
         ("labcrane: 1", "# as of old\n%YAML 1.1\n---\nlabcrane: 1",
-         "2:1: the file is to be read as YAML 1.1, in which no is false and 1:30 is 90; leave this line out"),
+         "2:1: the file asks for YAML 1.1, in which no is false and 1:30 is 90; remove this line"),
         ("{pairs: shuffled}", "{pairs: shuffled}\n  groups: {1: [], '1': []}",
          "16:19: it has the key '1' twice, with and without quotation marks; keep one"),
         ("{pairs: shuffled}", "{pairs: shuffled}\n  groups: {a: [], ~: []}",
@@ -130,7 +130,7 @@ def test_a_mistake_is_told_with_its_line(complaint, old: str, new: str, said: st
         ("- block: {task: aiming, repeat: 2}", "- block:\n        task: aiming\n        repeat: 2",
          "22:9: 'task' is in one column with 'block', to which it belongs; indent it, and what follows, by two spaces more"),
         ("- block: {task: aiming, repeat: 2}", "- block: {task:aiming, repeat: 2}",
-         "21:17: there is no space behind the colon of 'task'; add one"),
+         "21:17: there is no space after the colon of 'task'; add one"),
         ("title: ", "title: 'A ",
          "3:8: the quotation mark that opens here is closed in line 4 only; close it where the text ends"),
         ("hello.md", '"hello.md', "19:23: the quotation mark that opens here is not closed; close it"),

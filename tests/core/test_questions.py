@@ -79,7 +79,7 @@ UNLIKE = [
     ("changes", "key", "said"),
     [
         ([("movements: 2", "movements: 2, limit_s: 0.3")], "tasks.aiming.limit_s", "at full speed"),
-        ([(BLOCK, BLOCK.replace(", pairs: 1", ""))], "design.order.pairs", "for pairs of 'aiming', so that they come as written, in one order for everybody"),
+        ([(BLOCK, BLOCK.replace(", pairs: 1", ""))], "design.order.pairs", "for pairs of 'aiming', so they come as written, in one order for everybody"),
         ([("sessions:", "design: {order: {pairs: shuffled}}\nsessions:")], "sessions.1.steps.1.block.pairs",
          "takes 1 of the 2 pairs of 'aiming', whose order is shuffled: each participant does a different"),
         ([("sessions:", "design: {order: {pairs: {rule: shuffled, times: 2}}}\nsessions:"), ("pairs: 1", "pairs: 2")],
@@ -97,14 +97,14 @@ UNLIKE = [
         ([("movements: 2", "movements: 900"), (BLOCK, BLOCK.replace("pairs: 1", "repeat: 9"))], "sessions.1", "is likely to take"),
         ([("    steps:", "    after_days: [1, 2]\n    steps:")], "sessions.1.after_days", "no other"),
         ([("rate_hz: 240", "rate_hz: 1500")], "rate_hz", "few computers hold"),
-        ([("rate_hz: 240", "rate_hz: 10")], "rate_hz", "seen to jump"),
+        ([("rate_hz: 240", "rate_hz: 10")], "rate_hz", "appear to jump"),
         ([("sessions:", BALL), (BLOCK, BLOCK.replace("pairs", "feedback: [ball], pairs"))],
          "feedback.tone", "never switched on"),
         ([("sessions:", GROUPS)], "design.groups", "no block has feedback: group"),
         ([("sessions:", "views: {v: {use: view, rate_hz: 10}}\nsessions:")], "views.v.rate_hz",
-         "shows 10 pictures a second, and presented asks for 15, so that no movement counts"),
+         "shows 10 pictures a second, but presented requires 15, so no movement counts"),
         ([("sessions:", "views: {v: {use: view}}\npresented: {max_gap_s: 2}\nsessions:")], "presented.max_gap_s",
-         "presented allows 2 s without a picture, and min_hz asks for pictures in every 1 s"),
+         "presented allows 2 s without a picture, but min_hz requires pictures in every 1 s"),
         ([("sessions:", BALL)], "feedback.ball", "the operator has none, so that nobody sees it"),
         ([("sessions:", f"views: {{desk: {{use: view, seen_by: examiner, hud: []}}}}\n{BALL}")], "feedback.ball",
          "add one, as views: {operator: {use: view}}"),
@@ -186,7 +186,7 @@ UNLIKE = [
         ([("sessions:", "feedback: {t: {use: sonification, level: [0, 0]}}\nsessions:")], "feedback.t.level", "nothing is heard"),
         ([("sessions:", "feedback: {t: {use: sonification, rate_hz: 480}}\nsessions:")], "feedback.t.rate_hz", "few sound cards"),
         ([("sessions:", "views: {front: {use: view, delay_s: 1 min}}\nsessions:")], "views.front.delay_s", "60 s: nobody steers"),
-        ([("sessions:", "views: {front: {use: view, rate_hz: 0.1}}\nsessions:")], "views.front.rate_hz", "seen to jump"),
+        ([("sessions:", "views: {front: {use: view, rate_hz: 0.1}}\nsessions:")], "views.front.rate_hz", "appear to jump"),
         ([("sessions:", "views: {front: {use: view, viewing_m: 60}}\nsessions:")], "views.front.viewing_m", "is 60 m from the eye"),
         ([("sessions:", "views: {front: {use: view, viewing_m: 0.6, text_arcmin: 5000}}\nsessions:")], "views.front.text_arcmin", "16 to 22"),
         ([("sessions:", "views: {front: {use: view, screen: 1}, back: {use: view, screens: [0, 1]}}\nsessions:")], "views.back", "'front' and 'back' both fill screen 1"),
@@ -239,7 +239,7 @@ def test_a_cue_that_is_told_nearer_beside_one_that_is_told_farther_adds_no_fact(
     both = NEAR.replace("heard: [tone]", "both: [ball, tone]")
     group = (BLOCK, BLOCK.replace("pairs", "feedback: group, pairs"))
     asked = questions(a_study(tmp_path, ("sessions:", f"{both}sessions:"), group))
-    assert not [each for each in asked if "not told the same" in each.text]
+    assert not [each for each in asked if "not give the same information" in each.text]
 
 
 def test_blocks_that_tell_the_same_and_blocks_of_other_tasks_are_not_asked_about(
@@ -254,7 +254,7 @@ def test_blocks_that_tell_the_same_and_blocks_of_other_tasks_are_not_asked_about
         (BLOCK, "also, ".join(TWO_BLOCKS.rsplit("aiming, ", 1))),
     ]
     found += questions(a_study(tmp_path, *other))
-    assert not [each for each in found if "not told the same" in each.text]
+    assert not [each for each in found if "not give the same information" in each.text]
 
 
 def test_300_answers_after_the_trials_of_a_step_are_not_asked_about(tmp_path: Path) -> None:
@@ -278,11 +278,11 @@ ASK = ", ask: [subjective_accuracy, situational_awareness]"
     ("changes", "key", "said", "line"),
     [
         ([(REFERENCE, "      - break: {seconds: 9}")], "sessions.1.steps.4.block.task",
-         "own reference time, which no step before it takes, so that labcrane score leaves its tests out; write reference: {task: retrieval}", "- block:"),
+         "own reference time, which no earlier step measures, so labcrane score leaves its tests out; write reference: {task: retrieval}", "- block:"),
         ([(REFERENCE, REFERENCE.replace("}", ", scenes: 2}"))], "sessions.1.steps.4.block.task",
-         "own reference time, which no step before it takes", "- block:"),
+         "own reference time, which no earlier step measures", "- block:"),
         ([(REFERENCE, REFERENCE.replace("}", ", scenes: 2}")), ("{scenes: shuffled}", "{scenes: as_written}")],
-         "sessions.1.steps.4.block.task", "reference time of {lacks}, which no step", "- block:"),
+         "sessions.1.steps.4.block.task", "reference time of {lacks}, which no earlier", "- block:"),
         ([(ASK, "")], "sessions.1.steps.4.block.ask", "subjective_accuracy and situational_awareness are asked neither in it nor after it", "- block:"),
         ([(ASK, ", ask: [situational_awareness]")], "sessions.1.steps.4.block.ask", "subjective_accuracy is asked neither", "- block:"),
     ],
@@ -487,13 +487,13 @@ def test_a_quantity_is_read_in_the_unit_that_is_asked_for(
 @pytest.mark.parametrize(
     ("text", "unit", "said"),
     [
-        ("5 kg", "m", "'5 kg' is a mass, where a length is asked for; write a plain number, in m, or a length with its unit, as 50 cm"),
+        ("5 kg", "m", "'5 kg' is a mass, where a length is required; write a plain number, in m, or a length with its unit, as 50 cm"),
         ("90 deg", "m", "is an angle, where a length is asked for"),
         ("30 %", "deg", "where an angle is asked for"),
-        ("3 foos", "s", "has no unit that is known, where a time is asked for"),
+        ("3 foos", "s", "has no known unit, where a time is asked for"),
         ("1,5 m", "m", "write decimals with a point: 1.5 m"),
         ("1:30", "s", "is not a number of seconds; write 90"),
-        ("9 m**9**9**9", "m", "has no unit that is known"),
+        ("9 m**9**9**9", "m", "has no known unit"),
     ],
 )  # fmt: skip
 def test_a_quantity_of_another_kind_is_told_with_what_is_asked_for(

@@ -95,8 +95,8 @@ def told(tmp_path: Path, registry: Registry):
         ("retrieval", "model: arm.dmd.yaml\n  prop", "model: avc.dbc\n  prop", "16:10: "),
         ("retrieval", "jaws: {grip_n: 60", "jaws: {joint: boom, grip_n: 60", "18:17: the jaws' joint 'boom' must be the machine's last and have length 0, but the last is 'jaws'"),
         ("retrieval", "proportional: [base]", "proportional: [base, base]", "17:24: dynamics.proportional has 'base' twice; write it once"),
-        ("aiming", "pattern: 'P\\d{3}'", 'pattern: "P\\d{3}"', "7:28: this is not valid YAML: a backslash in double quotation marks starts an escape sequence; use single ones: 'P\\d{3}'"),
-        ("aiming", "  map:", "\tmap:", "14:1: there is a tab, which YAML does not take for indentation; write spaces"),
+        ("aiming", "pattern: 'P\\d{3}'", 'pattern: "P\\d{3}"', "7:28: this is not valid YAML: a backslash in double quotation marks starts an escape sequence; use single quotation marks: 'P\\d{3}'"),
+        ("aiming", "  map:", "\tmap:", "14:1: there is a tab, which YAML does not accept as indentation; use spaces"),
     ],
 )  # fmt: skip
 def test_a_name_of_nothing_is_told_where_it_stands(
@@ -127,7 +127,7 @@ def test_a_scene_that_the_dynamics_has_not_is_told(told) -> None:
         ("gripper", "griper", "10:118: {}: there is no link 'griper'; did you mean 'gripper'? it has base,"),
         ("{elbow: 60}", "{elbo: 60}", "10:144: rest_deg names 'elbo'; did you mean 'elbow'? its joints are slew,"),
         ("{elbow: 60}", "{elbow: 600}", "10:145: {} as a machine: joint 'elbow': rest_deg 600 is outside the joint's range; it must be -54 to 79.2"),
-        ("_x.urdf", "_y.urdf", "10:17: machine file '{}' does not exist; a path counts from"),
+        ("_x.urdf", "_y.urdf", "10:17: machine file '{}' does not exist; paths are relative to"),
     ],
 )  # fmt: skip
 def test_a_wrong_name_of_a_robots_file_is_told_where_the_protocol_has_it(
@@ -641,7 +641,7 @@ TRACK = "design:\n  tracks: {t: {factor: pairs, levels: {2m_far_left: 2, 4m_far_
         ("design:", TRACK % "up_down: {reversals: 30}, rounds: 20", "30}, rounds", "there are 20 rounds"),
         ("design:", TRACK % "up_down: {}, rounds: 5", "5}}", "there are 5 rounds"),
         ("machine: ch8 ", "machine: {urdf: a.urdf, joints: [a, b, c], tip: t, mjcf: a.xml} ", "a.xml", "described by one file"),
-        ("design:", "streams: {a: {type: EEG, evening: forbid, min_delay_s: 0.01}}\ndesign:", "0.01}", "or do not forbid evening"),
+        ("design:", "streams: {a: {type: EEG, evening: forbid, min_delay_s: 0.01}}\ndesign:", "0.01}", "or do not write evening: forbid"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_of_several_keys_is_told_at_one_of_them(
@@ -687,7 +687,7 @@ def test_a_question_of_a_described_machine_is_asked_where_the_joint_is(
         ("dead_zone: 0.05", "dead_zone: 5", "scheme.dead_zone is 5; it must be less than 1"),
         ("design:", TRACK % "up_down: {harder_afters: 1}", "'harder_afters' is not a key of design.tracks.t.up_down; did you mean 'harder_after'?"),
         ("design:", TRACK % "up_down: {}, foo: 1", "'foo' is not a key of design.tracks.t; possible: factor, levels, up_down, quest_plus, start, rounds, measure, at_least, at_most, carry"),
-        ("design:", "monitors: {a: {use: stick_signal, foo: 1}}\ndesign:", "'foo' is not a key of monitors.a, which has none; leave it out"),
+        ("design:", "monitors: {a: {use: stick_signal, foo: 1}}\ndesign:", "'foo' is not a key of monitors.a, which has no keys; remove it"),
     ],
 )  # fmt: skip
 def test_a_number_that_cannot_be_is_told_with_its_bound_and_unit(

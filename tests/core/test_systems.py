@@ -135,7 +135,9 @@ def test_a_lock_on_windows_is_waited_for_as_long_as_it_takes(
 
 
 def test_a_folder_on_windows_is_held_by_one_at_a_time(tmp_path: Path, windows: Locks) -> None:
-    refused = f"^another labcrane is at work in {tmp_path}; wait for it, or give another folder "
+    refused = (
+        f"^another labcrane process is working in {tmp_path}; wait for it, or give another folder "
+    )
     with lock.alone_in(tmp_path):
         assert [path.name for path in tmp_path.iterdir()] == [".labcrane-at-work"]
         with pytest.raises(RecordingError, match=refused), lock.alone_in(tmp_path, wait=False):

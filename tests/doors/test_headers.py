@@ -40,10 +40,10 @@ def test_a_header_may_be_as_large_as_the_table_says(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        (long(MOST + 1), f"it has {MOST + 1} characters; the most are {MOST}"),
+        (long(MOST + 1), f"it has {MOST + 1} characters; the maximum is {MOST}"),
         (
             header(CHANNELS + 1),
-            f"stream 'EEG' has {CHANNELS + 1} channels; the most are {CHANNELS}",
+            f"stream 'EEG' has {CHANNELS + 1} channels; the maximum is {CHANNELS}",
         ),
         (header(10**12), "stream 'EEG' has 1000000000000 channels"),
         (header("9" * 5000), "a stream header cannot be read"),

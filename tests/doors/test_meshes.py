@@ -250,7 +250,7 @@ def test_many_places_of_one_mesh_count_each(tmp_path: Path) -> None:
     tree["bufferViews"][0]["byteLength"] = tree["buffers"][0]["byteLength"] = 12 * count
     (tmp_path / "many.glb").write_bytes(glb(tree, bytes(12 * count)))
     most = LIMITS["triangles of a mesh"].most
-    with pytest.raises(MeshError, match=rf"10001000 triangles; the most are {most}"):
+    with pytest.raises(MeshError, match=rf"10001000 triangles; the maximum is {most}"):
         read_surfaces(tmp_path / "many.glb")
 
 

@@ -31,7 +31,7 @@ URDF = {
     ),
     "deep": (urdf("<a>" * 50_000 + "</a>" * 50_000), "nested deeper than 100 elements"),
     "wide": (urdf("<link/>" * 30_000), "has more than 20000"),
-    "links": (urdf(LINKS), "it has 600 links; the most are 500"),
+    "links": (urdf(LINKS), "it has 600 links; the maximum is 500"),
     "large": (urdf(" " * 5_100_000), "robot.xml has 51000"),
     "no XML": ("robot", "it cannot be read: syntax error"),
     "two bytes a letter": (urdf("").encode("utf-16").decode("latin-1"), "is not UTF-8"),

@@ -18,7 +18,7 @@ MOST = LIMITS["CSV table"].most
     ("content", "why"),
     [
         (b"participant,age\nP001,\xe4lt\n", "byte 0xE4 in line 2 is not UTF-8; save it as UTF-8"),
-        (b"participant,age\nP001,\0\n", "line 2 holds a NUL, which no table does"),
+        (b"participant,age\nP001,\0\n", "line 2 contains a NUL character; remove it"),
         (b"participant,age\nP001," + b"9" * 140_000, "field larger than field limit"),
         (b"participant,age\nP001,30,left\n", "line 2: this row has more or fewer cells"),
         (b"participant,age\nP001,30\nP001,31\n", "line 3: 'P001' is there twice; keep one row"),
@@ -54,5 +54,5 @@ def test_a_packed_table_is_unpacked_no_further_than_a_table_may_be(tmp_path: Pat
     assert len(read_csv_text(path)) == MOST
     with path.open("wb") as file:
         file.truncate(MOST + 1)
-    with pytest.raises(LabcraneError, match=f"it has {MOST + 1} bytes; the most are {MOST}"):
+    with pytest.raises(LabcraneError, match=f"it has {MOST + 1} bytes; the maximum is {MOST}"):
         read_recordings(path)

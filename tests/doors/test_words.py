@@ -78,7 +78,7 @@ def test_no_sequence_of_orders_with_any_words_raises_in_the_loop(
 def test_an_answer_beyond_the_limits_is_refused_without_being_kept(study: Study) -> None:
     script = {2: [Command(Order.ANSWER, "[" * 100_000, "participant")], 4: [Command(Order.END)]}
     [refused] = rehearse(study, script, waits=True).events("questionnaire.refused")
-    assert refused.data["why"] == "the answer has 100000 characters; the most are 8000"
+    assert refused.data["why"] == "the answer has 100000 characters; the maximum is 8000"
     assert refused.data["given"] == ""
 
 
@@ -114,7 +114,7 @@ def test_each_kind_of_words_may_be_as_long_as_the_table_says_and_no_longer(
 ) -> None:
     most = LIMITS[KINDS[order]].most
     assert beyond_limits(Command(order, "a" * most)) is None
-    assert f"has {most + more} characters; the most are {most}" in str(
+    assert f"has {most + more} characters; the maximum is {most}" in str(
         beyond_limits(Command(order, "a" * (most + more)))
     )
 
@@ -125,7 +125,7 @@ def test_what_is_beyond_the_limits_is_refused_before_it_reaches_a_pipe() -> None
     assert console.commands() == [
         Command(
             Order.DENIED,
-            "note: the note has 20000000 characters; the most are 4000",
+            "note: the note has 20000000 characters; the maximum is 4000",
             "supervisor",
             "10.0.0.7",
         )

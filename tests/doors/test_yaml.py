@@ -48,11 +48,17 @@ MERGES = "a: &a {x: 1}\n" + "".join(
         ),
         ("[" * 3000, ":1:51: nested deeper than 50 levels; write it flat"),
         ("a:\n" + "- " * 2000, ":2:100: nested deeper than 50 levels; write it flat"),
-        (BOMB, " holds more than 50000 values, or itself, behind its aliases; write fewer of them"),
-        ("title: " + "x" * 5_000_000, " cannot be read: it has 5000007 bytes; the most are 256000"),
+        (
+            BOMB,
+            " contains more than 50000 values, or itself, through its aliases; use fewer of them",
+        ),
+        (
+            "title: " + "x" * 5_000_000,
+            " cannot be read: it has 5000007 bytes; the maximum is 256000",
+        ),
         ("a: [" + "1, " * 20_001 + "1]", " has more than 20000 commas, colons, brackets, dashes"),
         ("a: 0b" + "1" * 90_000, ":1:4: it holds a whole number of 90000 bits; write less"),
-        ('a: "\\ud800"', ":1:4: it holds the character U+D800 in "),
+        ('a: "\\ud800"', ":1:4: it contains the character U+D800 in "),
         ("a: !!python/object:os.system x", ":1:4: it holds 'x' with a tag; write plain values"),
         (
             "a: !!int x",

@@ -200,7 +200,7 @@ def test_no_more_frames_wait_for_a_disk_than_the_table_of_limits_allows(
         record(visit, console)
     [said] = caught.value.__notes__
     assert "frames and events wait for the disk, and no more can: cannot write" in said
-    assert "the session ends, mend the disk and go on with labcrane resume" in said
+    assert "the session ends: repair the disk, then run labcrane resume" in said
     assert "order.end" not in [event.name for event in console.told], "long before the order"
 
 

@@ -160,7 +160,7 @@ def test_killed_hanging_and_raising_feedback_leave_the_session_as_it_is(
     why = {data["what"]: data["why"] for data in lost["data"]}
     assert set(why) == {"killed", "hanging", "raising"}
     assert "its process ended with exit code -9" in why["killed"]
-    assert "it has not been heard of for" in why["hanging"]
+    assert "it has not responded for" in why["hanging"]
     assert "ValueError: a mistake in a plugin" in why["raising"]
 
     loop = session.streams["loop"].data

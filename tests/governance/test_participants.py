@@ -208,7 +208,7 @@ def test_a_note_that_leads_to_a_person_is_refused_everywhere(lab: Lab) -> None:
         lambda: enrolment.note(lab.places, "P001", "anna@uni.example"),
         lambda: enrolment.exclude(lab.places, "P001", "call +48 600 123 456", TODAY),
     ):
-        with pytest.raises(ProtocolError, match="which would lead to a person; write it without"):
+        with pytest.raises(ProtocolError, match="which could identify a person; remove that"):
             refused()
     lab.run("P001", {30: [Command(Order.NOTE, "mail anna@uni.example")]})
     enrolment.note(lab.places, "P001", "left-handed")

@@ -139,8 +139,8 @@ def test_the_wrongly_used_slot_and_seed_are_a_deviation(lab: Lab) -> None:
     ("new", "said"),
     [
         ("P002", "P002 has recordings of its own; relabel P002 first"),
-        ("P007", r"P007 cannot become 'P007': it takes another pseudonym"),
-        ("Anna", r"P007 cannot become 'Anna': it takes another pseudonym that matches"),
+        ("P007", r"P007 cannot become 'P007': give another pseudonym"),
+        ("Anna", r"P007 cannot become 'Anna': give another pseudonym that matches"),
     ],
 )
 def test_an_impossible_relabelling_is_refused(lab: Lab, new: str, said: str) -> None:

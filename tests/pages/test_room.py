@@ -270,10 +270,10 @@ def test_the_lamp_at_the_end_is_what_was_left_behind() -> None:
     view = after(*BEGUN["ended"])
     assert lamp_of(view, Punctual(), EXPECTED).reason == "the session is being saved"
     view.ended = SessionLeft(
-        "warn", "The session is saved, and not complete: trial 3", "go on with: x"
+        "warn", "The session is saved but incomplete; remaining: trial 3", "to continue, run: x"
     )
     assert lamp_of(view, Punctual(), EXPECTED) == Lamp(
-        "warn", "The session is saved, and not complete: trial 3", "go on with: x"
+        "warn", "The session is saved but incomplete; remaining: trial 3", "to continue, run: x"
     )
 
 

@@ -41,8 +41,8 @@ STOPPED = {
 }  # fmt: skip
 ASKED = {"questionnaire": "person", "title": "About you", "kept": "{}"}
 ENDED = SessionLeft(
-    "warn", "The session is saved; look at its time stamps, and not complete: 3 trials",
-    "go on with: labcrane resume study.yaml --participant P001 --session 1",
+    "warn", "The session is saved but incomplete; check its timestamps; remaining: 3 trials",
+    "to continue, run: labcrane resume study.yaml --participant P001 --session 1",
     ("participant file: data/P001/P001.h5 (12.3 MB)", "journal: data/P001/ses-01_run.xdf"),
     ("stream", "verdict", "uncertainty"), (("EEG", "WARN", "1.4 ms"), ("loop", "PASS", "0 ms")),
     ("EEG: move the computers into one network",),

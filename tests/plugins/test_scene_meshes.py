@@ -144,7 +144,7 @@ f 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\nf 6 1 7 12
         (OPEN, r"piece 1 of mesh '.*wall.obj' is open or has hollows: it has \d+ % of the volume"),
         (L_OF_ONE_PIECE, r"has 86 % of the volume of the solid around it; close it, or cut it"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "piece 1 of mesh .* is flat"),
-        (obj((SIDE,) * 65, 0.001), "has 65 pieces, and 64 at most can be touched"),
+        (obj((SIDE,) * 65, 0.001), "has 65 pieces, but contact allows 64 at most"),
     ],
 )
 def test_a_mesh_that_cannot_be_touched_as_it_is_seen_is_refused(
@@ -159,7 +159,7 @@ def test_a_mesh_that_cannot_be_touched_as_it_is_seen_is_refused(
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ((", mesh: {file: wall.obj, scale: 0.001}", ""), "has its file under mesh, no size"),
+        ((", mesh: {file: wall.obj, scale: 0.001}", ""), "has its file under mesh, and no size"),
         (("wall.obj", "wall.stl"), "'wall.stl' is not an OBJ file; a mesh for contact must be one"),
     ],
 )

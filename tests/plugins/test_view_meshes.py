@@ -165,7 +165,7 @@ def a_machine_study(folder: Path, mesh: str) -> Path:
     [
         (
             "no.stl",
-            r"mine\.yaml:\d+:\d+: joints\[4\]\.mesh.*there is no mesh '.*no\.stl'; a path",
+            r"mine\.yaml:\d+:\d+: joints\[4\]\.mesh.*there is no mesh '.*no\.stl'; paths",
         ),
         (
             "cut.stl",

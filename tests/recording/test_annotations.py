@@ -59,7 +59,7 @@ def test_a_mark_that_is_taken_back_is_shown_no_more_and_stays_in_the_file(record
     assert [mark.text for mark in read_annotations(recording.parent, 1)] == ["at 2", "at 3"]
     lines = annotations_path(recording.parent, 1).read_text("utf-8").splitlines()
     assert [json.loads(line).get("text") for line in lines] == ["at 3", "at 1", "at 2", None]
-    with pytest.raises(RecordingError, match=r"has no mark 2; it has 1, 3"):
+    with pytest.raises(RecordingError, match=r"has no annotation 2; it has 1, 3"):
         withdraw(recording, 1, 2)
     assert annotate(recording, 1, 0.5, "again").number == 5, "a number is nobody else's later"
 
@@ -105,8 +105,8 @@ def test_a_kill_while_a_mark_is_made_leaves_all_before_and_the_next_one_is_kept(
 @pytest.mark.parametrize(
     ("words", "until", "why"),
     [
-        ("  ", None, "a mark needs words"),
-        ("x" * 4001, None, r"has 4001 characters; the most are 4000"),
+        ("  ", None, "an annotation cannot be empty"),
+        ("x" * 4001, None, r"has 4001 characters; the maximum is 4000"),
         ("back\u202ewards", None, r"contains the character U\+202E"),
         ("early", 1.0, "cannot last from 2 to 1 s"),
         ("never", float("nan"), "cannot last from 2 to nan s"),

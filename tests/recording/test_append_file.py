@@ -43,7 +43,7 @@ def test_a_block_that_does_not_fit_is_taken_back_whole(tmp_path: Path) -> None:
             file.write(b"b" * 101)
         assert path.read_bytes() == b"a" * 909
         file.write(b"c" * 91)  # the rest of the room
-        with pytest.raises(RecordingError, match="in a new part"):
+        with pytest.raises(RecordingError, match="in a new segment"):
             file.write(b"d")
         file.close()
     assert path.read_bytes() == b"a" * 909 + b"c" * 91

@@ -130,7 +130,7 @@ def test_a_session_is_recovered_and_gone_on_with_beside_a_spoilt_marker(
     spoil(visit.crash_marker)
     assert main(["recover", str(data)]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "a place that is not known any more, since" in said
+    assert "an unknown place, because" in said
     run(replace(visit, resumed=True, policy="redo_trial"), ScriptedConsole())
     session = open_recording(file).session(1)
     assert sum(session.trials["outcome"] == "success") == 8 > trials

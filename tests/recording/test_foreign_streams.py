@@ -204,7 +204,7 @@ def test_correcting_again_waits_for_whoever_writes_the_participant_file(folder: 
 
 
 def test_correcting_a_file_that_is_not_there_says_what_makes_one(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"no participant file .*; labcrane recover"):
+    with pytest.raises(RecordingError, match=r"no participant file .*; if there are journals"):
         recorrect(tmp_path / "nobody" / "P009.h5", as_they_are)
 
 

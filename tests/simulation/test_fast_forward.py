@@ -188,7 +188,7 @@ def test_a_study_with_one_component_without_a_twin_is_simulated_by_the_loop_and_
     written(tmp_path, drawn_study(1, "joint_velocity", "rest_inside"))
     _, way = simulated(protocol, tmp_path / "data")
     assert way["compiled"] is False
-    assert way["why"] == "scheme has no compiled twin"
+    assert way["why"] == "scheme has no compiled kernel"
 
 
 def test_without_numba_the_loop_simulates_and_says_what_to_install(

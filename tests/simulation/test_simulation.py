@@ -207,7 +207,7 @@ def test_two_simulations_do_not_share_a_folder(study: Path, tmp_path: Path) -> N
     data.mkdir()
     fd = os.open(data, os.O_RDONLY)
     fcntl.flock(fd, fcntl.LOCK_EX)
-    with pytest.raises(RecordingError, match="another labcrane is at work"):
+    with pytest.raises(RecordingError, match="another labcrane process is working"):
         list(simulate_study(orders(study, None, data)))
     os.close(fd)
 

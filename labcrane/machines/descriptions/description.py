@@ -20,7 +20,7 @@ class MachineDescription(StrictModel):
     """A machine of another program's file: ``{urdf: arm.urdf, joints: [...], tip: hook}``."""
 
     urdf: str | None = None
-    """A URDF file; a path counts from the protocol's folder."""
+    """A URDF file; paths are relative to the protocol's folder."""
 
     mjcf: str | None = None
     """An MJCF file, which is read by MuJoCo."""

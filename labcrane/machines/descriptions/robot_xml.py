@@ -153,7 +153,7 @@ def _check_values(element: ElementTree.Element) -> None:
         if asked > MOST_VALUES:
             raise ChainError(
                 f"<{element.tag}> asks for {asked:.3g} values by {names[0]} and {names[1]}; the "
-                f"most are {MOST_VALUES}"
+                f"maximum is {MOST_VALUES}"
             )
 
 

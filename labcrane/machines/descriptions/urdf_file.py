@@ -61,8 +61,8 @@ class UrdfFile:
         self._joints = {_name(each): each for each in root.findall("joint")}
         if len(self._links) > MOST_LINKS:
             raise ChainError(
-                f"it has {len(self._links)} links; the most are {MOST_LINKS}: leave out what does "
-                "not move"
+                f"it has {len(self._links)} links; the maximum is {MOST_LINKS}: remove those that "
+                "do not move"
             )
         self._above: dict[str, str] = {}
         for name, joint in self._joints.items():
@@ -203,7 +203,7 @@ class UrdfFile:
             if is_file(above / inside):
                 return (above / inside).relative_to(self._folder).as_posix()
         raise ChainError(
-            f"the mesh {written!r} of {link!r} is not beside the file, nor in a folder above it; "
+            f"the mesh {written!r} of {link!r} is not next to the file or in a folder above it; "
             "put it into the study's folder, or write meshes: false"
         )
 

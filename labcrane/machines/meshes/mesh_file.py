@@ -20,7 +20,7 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
     if file.suffix.lower() not in FORMATS:
         raise ValueError(f"{str(path)!r} is not a mesh file; use {', '.join(FORMATS)}")
     if not is_file(file):
-        raise ValueError(f"there is no mesh {str(file)!r}; a path counts from the file naming it")
+        raise ValueError(f"there is no mesh {str(file)!r}; paths are relative to its own file")
     # What is read with needs NumPy, which a protocol without meshes does without.
     from labcrane.machines.meshes.reader import read_surfaces  # noqa: PLC0415
 

@@ -38,8 +38,8 @@ def read_solids(asked: MeshFile) -> list[FloatArray]:
             found.append(_solid(asked, number, surface.points, faces))
     if len(found) > MOST:
         raise MeshError(
-            f"mesh {str(asked.file)!r} has {len(found)} pieces, and {MOST} at most can be touched; "
-            "join those that are one solid, or leave out what nobody touches"
+            f"mesh {str(asked.file)!r} has {len(found)} pieces, but contact allows {MOST} at most; "
+            "join pieces that are one solid, or remove pieces that need no contact"
         )
     return found
 
@@ -112,7 +112,7 @@ def _solid(asked: MeshFile, number: int, points: FloatArray, faces: Corners) -> 
     try:
         around = ConvexHull(np.unique(corners.reshape(-1, 3), axis=0))
     except QhullError as error:
-        raise MeshError(f"{which} is flat; what is touched needs a thickness") from error
+        raise MeshError(f"{which} is flat; a mesh for contact needs a thickness") from error
     # The divergence theorem, from the middle: what is open has less than the solid around it.
     own = abs(float(np.linalg.det(corners - around.points.mean(axis=0)).sum())) / 6.0
     if abs(own / around.volume - 1.0) > HOLLOW:

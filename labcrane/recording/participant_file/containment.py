@@ -298,6 +298,6 @@ class _Walk:
 
     def _refused(self, where: str, what: str) -> RecordingError:
         return RecordingError(
-            f"{self._path} is not as labcrane writes it: {where or '/'} {what}; use a copy that "
-            f"was not changed, or labcrane recover {self._path.parent} where the journals are"
+            f"{self._path} is not as labcrane writes it: {where or '/'} {what}; use an "
+            f"unchanged copy, or run labcrane recover {self._path.parent} if the journals exist"
         )

@@ -454,8 +454,8 @@ def open_recording(path: Path | str) -> Recording:
     path = Path(path)
     if not path.is_file():
         raise RecordingError(
-            f"there is no participant file {path}; labcrane recover {path.parent} makes one of the "
-            "journals, if there are any"
+            f"there is no participant file {path}; if there are journals, run labcrane recover "
+            f"{path.parent} to build it"
         )
     return Recording(path)
 

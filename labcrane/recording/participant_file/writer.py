@@ -326,7 +326,7 @@ def _refuse_less(path: Path, old: "h5py.File", session: _Session) -> None:
     if given < held:
         raise RecordingError(
             f"{path} holds {held:.0f} samples of session {session.number}, its journals only "
-            f"{given}; the file is left as it is, look for the missing parts of the journals"
+            f"{given}; the file is left as it is, look for the missing segments of the journals"
         )
 
 
