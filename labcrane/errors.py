@@ -49,7 +49,7 @@ class RecordingError(LabcraneError):
 
 
 MOST_LISTED = 40
-"""Names that a message lists beside the one that is meant."""
+"""Most names that a message lists with the suggested one."""
 
 
 def suggestion(word: str, known: Iterable[str], otherwise: str = "there is") -> str:

@@ -62,7 +62,7 @@ LIMITS: Mapping[str, Limit] = {
         0,
         "JSON of a known kind",
         "session.commands",
-        "refused by its sender, and told",
+        "refused by its sender, and reported",
     ),
     "frames waiting for a disk": Limit(
         200_000_000, "bytes", 0, "frames and events", "recording.frame_log", HELD
@@ -109,7 +109,7 @@ LIMITS: Mapping[str, Limit] = {
         32,
         "codes a tick",
         0,
-        "bytes; those that nobody sent 20 a second",
+        "bytes; at most 20 a second that were not sent",
         "streams.triggers, labcrane_ttl",
         "left out and counted; one event a second says how many",
     ),

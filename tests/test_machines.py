@@ -168,7 +168,7 @@ def test_an_unknown_machine_is_refused_with_those_there_are() -> None:
         load_machine("ch9")
     assert str(refusal.value) == (
         "no machine is called 'ch9'; did you mean 'ch8'? labcrane has ch8, ch8_cranelike, "
-        "and a file beside the protocol may end in .yaml"
+        "or name a .yaml file in the protocol's folder"
     )
 
 

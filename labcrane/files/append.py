@@ -181,5 +181,5 @@ def _create(path: Path) -> int:
 
 
 def _identity(status: os.stat_result) -> tuple[int, int]:
-    """Return what tells a file from any other on this computer."""
+    """Return the identity of a file on this computer."""
     return status.st_dev, status.st_ino

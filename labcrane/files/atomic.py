@@ -17,7 +17,7 @@ SHARED_FILE = 0o644
 """Permissions of what belongs to the study: colleagues read it."""
 
 UNFINISHED = ".unfinished"
-"""How the name of a file ends that is being written beside the one it will replace."""
+"""End of the name of a file that is being written next to the one it will replace."""
 
 
 def write_text(path: Path, text: str, mode: int = PRIVATE_FILE) -> None:

@@ -14,7 +14,7 @@ def rendered(template: Path, **values: object) -> str:
     Parameters
     ----------
     template
-        A file of jinja2; what it includes lies beside it.
+        A file of jinja2; the files that it includes are in the same folder.
     values
         What it names; texts are escaped unless they are ``markupsafe.Markup``.
 

@@ -137,7 +137,7 @@ def _plain_types(annotation: Any) -> Iterator[Any]:
 def number_at(model: type[BaseModel], place: Sequence[str | int]) -> tuple[str | int, ...]:
     """Return where the key of a number is, which has a default, at a place or around it.
 
-    Nothing where there is none: without it the model would not be what was written.
+    Empty where there is none.
     """
     keys = [at for at, step in enumerate(place) if isinstance(step, str)]
     key = tuple(place[: keys[-1] + 1]) if keys else ()

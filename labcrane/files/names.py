@@ -82,11 +82,11 @@ MISSING = frozenset(
 HASHED = 8
 
 COHORT = "cohort.yaml"
-"""Name of a simulated population's file beside a protocol."""
+"""Name of a simulated population's file in the protocol's folder."""
 
 
 def check_name(name: str, what: str) -> str:
-    """Return a name as it is, if it can be part of a path everywhere.
+    """Return a name unchanged, if it can be part of a path everywhere.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def misfit(name: str, *, person: bool = True) -> str | None:
     Parameters
     ----------
     person
-        Whether it is a participant's: those lie beside our own folders, and have stamps.
+        Whether it is a participant's: those are next to our own folders, and have suffixes.
     """
     if not ALLOWED.fullmatch(name):
         return (
@@ -169,7 +169,7 @@ def outside(path: Path, folder: Path) -> str | None:
 
 
 def absent(path: Path) -> str:
-    """Return that there is no such file, and which one beside it may be meant."""
+    """Return that there is no such file, and which one in its folder may be meant."""
     beside = sorted(each.name for each in path.parent.glob("*")) if is_folder(path.parent) else []
     more = ", ..." if len(beside) > MOST_LISTED else ""
     there = f"{path.parent} has {', '.join(beside[:MOST_LISTED]) or 'none'}{more}"

@@ -12,7 +12,7 @@ PRIVATE_MODES = sys.platform != "win32"
 """Whether permissions of a file keep others from reading it.
 
 Windows has only one such permission: whether the file may be written. The access list of the folder
-decides there, and new files and folders inherit it. In the user's profile it admits nobody but the
+decides there, and new files and folders inherit it. In the user's profile it admits only the
 user.
 """
 

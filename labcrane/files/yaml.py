@@ -1,4 +1,4 @@
-"""A YAML file that remembers where everything stands, so that every mistake gets a line."""
+"""A YAML file that keeps the position of every value, so that every mistake gets a line."""
 
 import re
 import warnings
@@ -77,7 +77,7 @@ class YamlFile:
         return cls(path, text, data, marked, recorded=recorded)
 
     def position(self, place: Place, *, key: bool = False) -> tuple[int, int]:
-        """Return line and column, from 1, of what stands at ``place``.
+        """Return line and column, from 1, of the value at ``place``.
 
         That is the value where it begins in the line of its key, and the key otherwise, or where
         ``key`` is asked for. What is not there, or came with a merge, gives the place of what holds
@@ -93,7 +93,7 @@ class YamlFile:
         return at[0] + 1, at[1] + 1
 
     def where(self, place: Place) -> str:
-        """Return file, line and column of what stands at ``place``, as an error begins."""
+        """Return file, line and column of the value at ``place``, as the beginning of an error."""
         line, column = self.position(place)
         return f"{self.path}:{line}:{column}"
 
@@ -119,9 +119,9 @@ class YamlFile:
         yield from _uneven_commas(self._marked, (), self.text.split("\n"))
 
     def check(self, model: type[ModelT], place: Place = (), value: Any = None) -> ModelT | None:
-        """Return what stands at ``place`` as a ``model``, or note what is wrong and return None.
+        """Return the value at ``place`` as a ``model``, or note its mistakes and return None.
 
-        ``value`` is checked instead where what the model sees is not what stands in the file.
+        ``value`` is checked instead where the model gets another value than the one in the file.
         """
         if value is None:
             value = self.data
@@ -264,7 +264,7 @@ def read_text(path: Path) -> str:
     Raises
     ------
     ProtocolError
-        There is none, it is larger than such files are, or no text.
+        There is none, it is too large, or it is not text.
     """
     try:
         check_size(path.stat().st_size, "YAML file", "it")
@@ -316,7 +316,7 @@ def parse_yaml(text: str, name: str, *, recorded: bool = False) -> Any:
     Parameters
     ----------
     name
-        What the text is, for the message when it is none.
+        Name of the text, for messages.
     recorded
         Whether it is part of a record: earlier versions allowed characters that are refused now,
         and anchors that are defined twice.
@@ -444,7 +444,7 @@ def _place_in(before: str) -> str:
 def _too_deep(text: str) -> int | None:
     """Return where brackets, dashes or indentation nest too deep; None where nothing does.
 
-    What looks nested inside quotes counts as well: nobody writes so.
+    Brackets inside quotes count as well; real files have no such depth.
     """
     depth, begin = 0, 0
     for line in text.split("\n"):
@@ -459,7 +459,7 @@ def _too_deep(text: str) -> int | None:
 
 
 def _plain(node: Any, name: str, *, recorded: bool = False) -> Any:
-    """Return a node as plain values; what aliases repeat is counted as often as it is there."""
+    """Return a node as plain values; values that aliases repeat are counted each time."""
     left = [MOST_VALUES]
 
     def plain(node: Any, depth: int) -> Any:

@@ -68,7 +68,7 @@ def pages(
 def _check_logo(protocol: Path, where: "PageSettings") -> None:
     """Raise :class:`ProtocolError` where the logo of the pages is not there, or no picture's size.
 
-    Before anybody sits down: a page with a hole looks broken.
+    This is checked before a session: a page without its logo looks broken.
     """
     if where.logo is None:
         return

@@ -25,7 +25,7 @@ class SessionHandle:
     Parameters
     ----------
     say
-        Is told what could not be sent.
+        Receives a message about what could not be sent.
     """
 
     def __init__(self, visit: Visit, say: Callable[[str], None]) -> None:

@@ -66,7 +66,7 @@ class ParentConsole:
         self._parent.tell(event)
 
     def offer(self, streams: Mapping[str, str]) -> None:
-        """Say which streams there are, so that nobody on this computer searches for them."""
+        """Announce the streams, so that no process on this computer searches for them."""
         self._parent.tell(Offered(streams))
 
     def end(self, ended: SessionEnded) -> None:

@@ -1,4 +1,4 @@
-"""Machines that are operated, and what stands around them.
+"""Machines that are operated, and their surroundings.
 
 In comes a machine or scene file; out go links with their masses and limits, forward and inverse
 kinematics, URDF, meshes and placed objects. Nothing here knows of a session.

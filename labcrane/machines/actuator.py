@@ -106,11 +106,11 @@ class Actuator:
         return (float(self.ideal), self._share, *self._most)
 
     def numbers(self) -> list[float]:
-        """Return what a compiled twin goes on from: speeds, then commands under way, in rad/s."""
+        """Return the state for a compiled kernel: speeds, then delayed commands, in rad/s."""
         return [*self._speeds, *(speed for command in self._waiting for speed in command)]
 
     def go_on(self, numbers: Sequence[float]) -> None:
-        """Go on from where a compiled twin came to: :attr:`numbers`, in rad/s."""
+        """Take over the state of a compiled kernel: :attr:`numbers`, in rad/s."""
         joints = len(self._speeds)
         self._speeds = list(numbers[:joints])
         rows = range(joints, joints * (1 + self._delay), joints)

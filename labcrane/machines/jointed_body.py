@@ -63,7 +63,7 @@ class Hinge:
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A rigid piece of a thing.
+    """A rigid part of a thing.
 
     Attributes
     ----------

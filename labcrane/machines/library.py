@@ -18,7 +18,7 @@ def machine_names() -> list[str]:
 
 
 def find_machine(name: str, beside: Path | None = None) -> Path:
-    """Return the file of machine ``name``; ``beside`` is the folder of the study that asks."""
+    """Return the file of machine ``name``; ``beside`` is the study's folder."""
     if name.endswith((".yaml", ".yml")):
         path = (beside or Path()) / name
         if is_file(path):
@@ -37,7 +37,7 @@ def find_machine(name: str, beside: Path | None = None) -> Path:
         return Path(str(files("labcrane") / "machines" / "data" / f"{name}.yaml"))
     there = nearest(name, machine_names(), "labcrane has")
     raise ProtocolError(
-        f"no machine is called {name!r}; {there}, and a file beside the protocol may end in .yaml"
+        f"no machine is called {name!r}; {there}, or name a .yaml file in the protocol's folder"
     )
 
 

@@ -39,7 +39,7 @@ SUNK_M = 0.001
 
 
 class Scatter(StrictModel):
-    """How far from its place a thing may stand; drawn evenly from the trial's seed."""
+    """Largest distance of a thing from its place; sampled uniformly from the trial's seed."""
 
     x: Extent = (0.0, 0.0)
     """Metres ahead."""
@@ -55,7 +55,7 @@ class SceneObject(StrictModel):
     """An object, or an obstacle when it is fixed: one shape, or a part of a library."""
 
     use: PartFile | None = None
-    """File of a library part, from beside the scene; it says all but place, turn and scatter."""
+    """File of a library part, from the scene's folder; it has all but place, turn and scatter."""
 
     shape: Literal["box", "cylinder", "sphere"] | None = None
     """A cylinder stands upright; needed unless a part is used."""
@@ -183,7 +183,7 @@ class Scene(StrictModel):
 
 @dataclass(frozen=True, slots=True)
 class PlacedObject:
-    """A thing where it stands in one trial.
+    """A thing at its place in one trial.
 
     Attributes
     ----------
@@ -255,7 +255,7 @@ def _check_parts(scene: Scene, source: YamlFile) -> None:
 
 
 def _check_ground(scene: Scene, source: YamlFile) -> None:
-    """Note things that stand in the ground."""
+    """Note things that are in the ground."""
     for name, thing in scene.things.items():
         below = max(map(lowest, _parts(name, thing)))
         low = thing.position[2] - below

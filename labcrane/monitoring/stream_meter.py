@@ -12,7 +12,7 @@ from labcrane.types import FloatArray
 
 WINDOW_S = 30.0
 SKEW_S = 5.0
-"""How long probes must have come until they tell a skew."""
+"""How long probes must have come until the skew is estimated, in seconds."""
 
 FEW_PROBES = 3
 
@@ -29,11 +29,11 @@ class StreamReading:
     samples
         How many have come since it was begun with.
     rate_hz
-        Samples per second by their own stamps.
+        Samples per second by their own timestamps.
     chunk, largest_chunk
         Samples that come at once: the usual number, and the most.
     jitter
-        How far intervals of stamps are from the usual one, 95th percentile.
+        Deviation of the intervals of timestamps from the usual one, 95th percentile.
     gaps, longest_gap
         Intervals of more than one and a half periods, and the longest of them.
     missing
@@ -41,7 +41,7 @@ class StreamReading:
     disorder
         Stamps that are not after the one before.
     delay, largest_delay
-        From its stamp to its arrival, on our clock: the middle, and the most.
+        From its timestamp to its arrival, on the recorder's clock: median and maximum.
     offset, rtt
         What is to be added to the source's clock, and the shortest round trip.
     skew_ppm
@@ -131,7 +131,7 @@ class StreamMeter:
         )
 
     def _intervals(self, stamps: FloatArray) -> "_Intervals":
-        """Return what the intervals of stamps tell; of irregular streams only their order."""
+        """Return facts about the intervals of timestamps; for irregular streams only the order."""
         steps = np.diff(stamps)
         disorder = int((steps <= 0.0).sum())
         rising = steps[steps > 0.0]

@@ -1,4 +1,4 @@
-"""Watching of streams before anybody sits down: how each comes, and whether its signal is alive."""
+"""Monitoring of streams before a session: how each arrives, and whether its signal is alive."""
 
 import threading
 import time

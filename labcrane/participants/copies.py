@@ -24,7 +24,7 @@ PARQUET, PACKED = ".parquet", ".gz"
 GZIP_HEAD = 512
 LONGEST_CELL = 2**31 - 1
 MANIFEST = ".labcrane/labcrane_export.json"
-"""What labcrane notes beside an export: who is in it, and who was left out."""
+"""File that labcrane writes next to an export: who is in it, and who was left out."""
 
 STORE = ".labcrane-store"
 """Says in a store that it is one: without it the disk is not plugged in, only its folder there."""
@@ -39,7 +39,7 @@ class Reach:
     changed, removed
         Files, for people.
     again
-        What was worked out of everybody's data and has been removed: how to make it again.
+        Results computed from all participants' data that were removed: how to make them again.
     owed
         What cannot be reached now: a disk that is not plugged in, a share that is offline.
     """
@@ -121,7 +121,7 @@ def reached_now(places: Places, register: Register, participant: str) -> list[st
 def edit_exports(
     places: Places, register: Register, old: str, new: str | None, reach: Reach
 ) -> None:
-    """Take ``old`` out of all that was written, or put ``new`` in its place.
+    """Remove ``old`` from all that was written, or replace it by ``new``.
 
     Tables are edited row by row; files of the participant alone are removed, or renamed; what
     cannot be edited is removed, since it can be made again. May be repeated at any moment.
@@ -211,7 +211,7 @@ def edit_file(
     mentions: Mentions,
     reach: Reach,
 ) -> None:
-    """Take ``old`` out of one file, or put ``new`` in its place."""
+    """Remove ``old`` from one file, or replace it by ``new``."""
     path = folder / name
     if not path.exists():
         path.with_name(f".{path.name}{UNFINISHED}").unlink(missing_ok=True)
@@ -252,9 +252,9 @@ def _without(name: str, content: bytes, old: str, mentions: Mentions) -> bytes |
 
 
 def _rows_without(text: str, separator: str, old: str, mentions: Mentions) -> str | None:
-    """Return a table without the rows of ``old``; every other row stays as it is, byte by byte.
+    """Return a table without the rows of ``old``; every other row stays unchanged, byte by byte.
 
-    None where nobody is named in it, or in its head: then its numbers may be of everybody.
+    None where no row or header names a participant: its numbers may then be of all.
     """
     kept, named = [], False
     for number, (row, raw) in enumerate(_records(text, separator)):
@@ -352,7 +352,7 @@ def _parquet_renamed(content: bytes, old: str, new: str, mentions: Mentions) -> 
 
 
 def _text_of(name: str, content: bytes) -> str | None:
-    """Return a file's text, unpacked; None if it is none."""
+    """Return a file's text, unpacked; None if it is not a text."""
     try:
         text = (gzip.decompress(content) if name.endswith(PACKED) else content).decode("utf-8")
     except (UnicodeDecodeError, OSError, EOFError):
@@ -411,6 +411,6 @@ def remove_from_stores(register: Register, participant: str, reach: Reach) -> No
 
 
 def write_manifest(folder: Path, content: Mapping[str, Any]) -> None:
-    """Note beside an export what it is; BIDS and Psych-DS look into no hidden folder."""
+    """Describe an export in a file next to it; BIDS and Psych-DS ignore hidden folders."""
     text = json.dumps(content, indent=2, ensure_ascii=False) + "\n"
     write_text(folder / MANIFEST, text)

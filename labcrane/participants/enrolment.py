@@ -156,7 +156,7 @@ def note(places: Places, participant: str, text: str) -> None:
 
 
 def waive(places: Places, participant: str, session: int, reason: str, today: date) -> None:
-    """Let a session be run out of its window, which is a deviation."""
+    """Allow a session outside its window, which is a deviation."""
     check_words(reason, "reason")
     with changed(places) as register:
         entry = register.entry(participant)

@@ -39,7 +39,7 @@ class Erased:
     mentions
         Files that still hold the pseudonym: written by people, not by labcrane.
     unsearched
-        What could not be searched for it, and why: nobody may take it for clean.
+        Files that could not be searched for it, and why: they may still contain it.
     """
 
     reach: Reach

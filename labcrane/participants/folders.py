@@ -57,7 +57,7 @@ class Places:
 
     @property
     def exports(self) -> Path:
-        """Where exports go unless told otherwise."""
+        """Default folder of exports."""
         return self.root / "exports"
 
     def raw(self, participant: str) -> Path:
@@ -96,7 +96,7 @@ def entries(folder: Path) -> Iterator[Path]:
 
 
 def keep_private(folder: Path) -> None:
-    """Take all permissions on ``folder`` and what is in it from everybody but the user.
+    """Remove the permissions of all other users on ``folder`` and its content.
 
     Links, and what is behind them, are left as they are.
     """

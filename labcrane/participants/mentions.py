@@ -8,11 +8,11 @@ from labcrane.files.names import STAMPS
 LETTER = r"[A-Za-z0-9]"
 
 LABELS = ("sub-", "subject-")
-"""What stands before a pseudonym in BIDS and in Psych-DS."""
+"""Prefixes of a pseudonym in BIDS and in Psych-DS."""
 
 
 def spellings(name: str) -> list[str]:
-    """Return how a pseudonym is written: as it is, and as BIDS and Psych-DS want it.
+    """Return the forms of a pseudonym: unchanged, and as BIDS and Psych-DS require it.
 
     Those take letters and digits only: ``VP-001-PILOT`` is ``VP001PILOT`` there.
     """
@@ -37,7 +37,7 @@ class Mentions:
     def of(self, text: str, start: int = 0, stop: int | None = None) -> set[str]:
         """Return whose pseudonyms begin in ``text`` between two of its places.
 
-        What stands around a word decides whether it is a name, so that of a longer text that is
+        The text around a word decides whether it is a name, so that of a longer text that is
         read in pieces each piece has something before and behind it.
         """
         # What begins with a look behind is tried at every sign, and files have many millions; the

@@ -34,7 +34,7 @@ def personal(text: str) -> str | None:
 
 
 def _is_mail(word: str) -> bool:
-    """Whether something stands before an @ and behind it, and then a dot and two letters.
+    """Whether there is text before an @ and after it, and then a dot and two letters.
 
     The first @ leaves the most behind it: no other needs to be tried.
     """

@@ -44,7 +44,7 @@ class Product:
 
     @property
     def people(self) -> list[str]:
-        """Pseudonyms of everybody whose data go in, without stamps."""
+        """Pseudonyms of all participants whose data go in, without suffixes."""
         return self._people
 
     def handing_out(self, people: Iterable[tuple[str, Someone]]) -> Iterator[Someone]:
@@ -112,7 +112,7 @@ def product(
     shared
         Patterns of files that contain no participant's data.
     whole
-        Whether everything is worked out of everybody's data, so that it goes as a whole.
+        Whether everything is computed from all participants' data, so that it is removed whole.
     """
     places, target = Places(data), target.resolve()
     staging = target / f".{file_name_of(exporter)}{UNFINISHED}"

@@ -30,7 +30,7 @@ WINDOW = 1 << 20
 """Bytes that are searched at a time."""
 
 OVERLAP = 1 << 10
-"""Bytes of a window that the next one begins with: longer than a name and what stands around it."""
+"""Bytes of a window that the next one begins with: longer than a name with the text around it."""
 
 IN_MEMORY = 1 << 24
 """Bytes of an archive in an archive that are kept in memory; a longer one goes to a file."""
@@ -174,7 +174,7 @@ class _Search:
 
 
 class _Enough(Exception):  # noqa: N818 - no error, but the end of a search
-    """More is packed in a file than anybody packs."""
+    """More is packed in a file than the limit allows."""
 
 
 def _full(file: BinaryIO, size: int) -> bytes:

@@ -87,7 +87,7 @@ class Entry(Record):
     sessions: list[Sitting] = Field(default_factory=list)
     exclusion: Exclusion | None = None
     waivers: dict[str, str] = Field(default_factory=dict)
-    """Sessions that may be run out of their window, and why."""
+    """Sessions that may be run outside their window, and why."""
     notes: list[str] = Field(default_factory=list)
     deviations: list[Deviation] = Field(default_factory=list)
     formerly: list[str] = Field(default_factory=list)
@@ -106,7 +106,7 @@ class Export(Record):
     people: list[str] = Field(default_factory=list)
     """All participants whose data went in, while it is being written as well."""
     whole: bool = False
-    """Whether every part of it was worked out of everybody's data: it cannot be edited."""
+    """Whether every part of it was computed from all participants' data: it cannot be edited."""
     staging: str = ""
     """Folder in which it is being written; gone once everything has its place."""
 
@@ -216,7 +216,7 @@ class Register(Record):
 
 
 def read(places: Places) -> Register:
-    """Return the register as it is; an empty one if there is none.
+    """Return the present register; an empty one if there is none.
 
     Raises
     ------
@@ -245,7 +245,7 @@ def read(places: Places) -> Register:
 
 
 def struck(places: Places) -> "dict[str, Struck]":
-    """Return whom the register says not to count, and why; nobody where there is no register."""
+    """Return the participants that the register excludes, and why; none without a register."""
     from labcrane.analysis.cohort import Status  # noqa: PLC0415 - with what reads recordings
 
     register = read(places)

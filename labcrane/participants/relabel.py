@@ -115,7 +115,7 @@ def carry_out(places: Places, work: Work) -> Reach:
 
 
 def _relabel_folder(source: Path, target: Path, old: str, new: str) -> None:
-    """Make the new folder beside the old one, give it its name at last, remove the old one."""
+    """Make the new folder next to the old one, then rename it, then remove the old one."""
     beside = target.with_name(f".{target.name}.relabelled")
     if not target.exists():
         make_folder(beside)

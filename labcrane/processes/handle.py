@@ -40,7 +40,7 @@ class Patience:
     silent_s
         Without having been heard of, once it is ready.
     stop_s
-        To end when it is told to; then it is killed.
+        To end when it is asked to; then it is killed.
     restarts
         How many starts in a row may come to nothing before it is left out.
     """
@@ -132,7 +132,7 @@ class ProcessHandle:
         return f"it has not responded for {silent:.0f} s" if silent > patience else None
 
     def tell(self, message: object) -> None:
-        """Tell the process something, without waiting for it; nobody hears it when it has died."""
+        """Send the process a message, without waiting; it is lost when the process has died."""
         self._present.outgoing.put(pickle.dumps(message))
 
     @property
@@ -238,14 +238,14 @@ class ProcessHandle:
 
 
 def _speak(life: _Life) -> None:
-    """Write what there is to tell; after the last of it, or when nobody hears it, hang up."""
+    """Write the messages; close after the last one, or when the process is gone."""
     send(life.outgoing, life.input)
     with suppress(OSError):
         life.input.close()
 
 
 def _apart() -> Mapping[str, Any]:
-    """Return how a child is kept from the terminal's interrupts: it ends when it is told to."""
+    """Return how a child is kept from the terminal's interrupts: it ends when it is asked to."""
     if sys.platform == "win32":
         apart: Mapping[str, Any] = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     else:

@@ -60,7 +60,7 @@ def received(pipe: IO[bytes]) -> Iterator[Any]:
 
 
 def send(outgoing: "queue.SimpleQueue[bytes | None]", pipe: IO[bytes]) -> None:
-    """Write what is put into ``outgoing``, up to None, or until nobody hears it any more."""
+    """Write what is put into ``outgoing``, up to None, or until the other end is closed."""
     with suppress(OSError):
         while (message := outgoing.get()) is not None:
             pipe.write(message)

@@ -126,8 +126,8 @@ class Design(Settings):
 
     conditions: dict[FactorName, Switch] = Field(default_factory=dict)
     """Conditions within participants, and the feedback that is on in each: ``{plain: none, tone:
-    [tone]}``. Everybody has all of them. A block with ``condition: 1`` is of the participant's
-    first, in the order of ``order: {condition: latin_square}``."""
+    [tone]}``. Every participant has all of them. A block with ``condition: 1`` has the
+    participant's first, in the order of ``order: {condition: latin_square}``."""
 
     order: dict[str, LevelOrder] = Field(default_factory=dict)
     """For each factor of the tasks, in which order its levels come: ``{pairs: shuffled}``, or

@@ -128,7 +128,7 @@ def _step(block: Schema) -> Schema:
     """Return the schema of a step in the form in which it is written, one key and its value."""
     name: Schema = {"type": "string"}
     kinds: dict[str, Schema] = {
-        "instructions": {**name, "description": "A text file beside the protocol."},
+        "instructions": {**name, "description": "A text file in the protocol's folder."},
         "questionnaire": {"anyOf": [name, {"type": "array", "items": name, "minItems": 1}]},
         "practice": block,
         "reference": block,

@@ -27,7 +27,7 @@ MOST_LOGO = 2_000_000
 """Bytes: every tablet loads it."""
 
 READABLE = 4.5
-"""Contrast of words and what they stand on, as WCAG 2.2 asks for at AA."""
+"""Contrast of text and background that WCAG 2.2 requires at AA."""
 
 
 def contrast_to_white(colour: str) -> float:

@@ -143,7 +143,7 @@ class Protocol(Section):
     """Ticks of the loop per second."""
 
     machine: Annotated[str | dict[str, Any], _AsDescribed()]
-    """Name of a machine that comes with labcrane, or of a YAML file beside the protocol; or a URDF
+    """Name of a machine that comes with labcrane, or of a YAML file in its folder; or a URDF
     or MJCF file with its joints: ``{urdf: arm.urdf, joints: [...], tip: hook}``."""
 
     input: Use
@@ -186,11 +186,11 @@ class Protocol(Section):
     """Streams of others to be recorded, by the study's names for them."""
 
     monitors: dict[str, Use] | None = None
-    """What tells whether the signals of those streams are alive, by name. Without this key all that
+    """Monitors of the signals of those streams, by name. Without this key all that
     are installed do, as they are without settings; ``{}`` is none."""
 
     sync: TimeLimits = TimeLimits()
-    """How right the time stamps must be."""
+    """Required accuracy of the timestamps."""
 
     presented: PresentedLimits = PresentedLimits()
     """How much of a movement the operator must have been shown."""
@@ -230,7 +230,7 @@ OTHERS = {
     "labcrane_part": "a part of a scene, and not a protocol",
     "labcrane_dmd": "a dynamic model, and not a protocol",
 }
-"""First keys of other files that lie beside a protocol."""
+"""First keys of other files in a protocol's folder."""
 
 
 def read(path: Path, *, recorded: bool = False) -> tuple[Protocol | None, YamlFile]:

@@ -263,7 +263,7 @@ def _of_repeats(study: Study) -> Doubts:
 
 
 def _of_what_is_told(study: Study) -> Doubts:
-    """Question groups, conditions and blocks that tell people different facts by other means."""
+    """Question groups, conditions and blocks that give different facts in different forms."""
     design, everything = study.protocol.design, tuple(study.protocol.feedback)
     meant = {"all": everything, "none": (), "group": ()}
     conditions = {
@@ -364,7 +364,7 @@ def _of_sizes(study: Study) -> Doubts:
 
 
 def _of_the_operator(study: Study) -> Iterator[CheckQuestion]:
-    """Question an operator who cannot stand in for the input: nothing can be simulated."""
+    """Question an operator that cannot replace the input: nothing can be simulated."""
     if needs_people(study.operator):
         yield CheckQuestion(
             "operator",
@@ -385,7 +385,7 @@ def _of_the_operator(study: Study) -> Iterator[CheckQuestion]:
 
 
 def needs_people(operator: ComponentSpec) -> bool:
-    """Whether what stands in for the input is itself hardware, or a view's keyboard."""
+    """Whether the substitute of the input is itself hardware, or a view's keyboard."""
     shown = (each.mark for each in mentioned(operator.settings))
     return operator.offer.examine is not None or any(mark == Reference("view") for mark in shown)
 
@@ -658,7 +658,7 @@ def _of_squares(study: Study) -> Doubts:
 
 
 def _of_conditions(study: Study) -> Doubts:
-    """Question conditions that not everybody has alike, or whose order tells what they do."""
+    """Question conditions that participants have unequally, or that are confounded with order."""
     design = study.protocol.design
     if not design.conditions:
         return
@@ -797,7 +797,7 @@ def _of_what_is_scored(study: Study) -> Doubts:
 
 
 def _scenarios(study: Study, block: Block, *, surely: bool) -> set[str]:
-    """Return the scenarios that everybody does in a block, or that anybody may; "" for none."""
+    """Return the scenarios that all participants do in a block, or that some may; "" for none."""
     task = study.tasks[block.task]
     levels = dict(task.factors())
     for factor, there in levels.items():
@@ -854,7 +854,7 @@ def _drawn_part(study: Study, block: Block, factor: str) -> bool:
 
 
 def _of_what_is_not_used(study: Study) -> Doubts:
-    """Question tasks that nobody does, and tracks that choose nothing."""
+    """Question tasks that no session has, and tracks that choose nothing."""
     protocol = study.protocol
     done = {block.task for _, block in _blocks(study)}
     for name in protocol.tasks:
@@ -867,7 +867,7 @@ def _of_what_is_not_used(study: Study) -> Doubts:
 
 
 def _of_what_is_not_asked(study: Study) -> Doubts:
-    """Question questionnaires that nobody is asked, and rules that go by them."""
+    """Question questionnaires that no session asks, and rules that use them."""
     protocol = study.protocol
     asked = {name for _, block in _blocks(study) for name in block.ask}
     asked |= {
@@ -969,7 +969,7 @@ def _of_fading(study: Study) -> Doubts:
 
 
 MOST_ANSWERS = 300
-"""Answers after the trials of one step that nobody is asked about."""
+"""Answers after the trials of one step that give no warning."""
 
 
 def _of_answers(study: Study) -> Doubts:
@@ -1041,8 +1041,8 @@ def _of_pulses(study: Study) -> Doubts:
                 yield (
                     (*part.split(".", 1), *each.place),
                     f"{part} sends {each.value} as a pulse, and a session learns of it only "
-                    f"{LEARNT_LATE[str(each.value)]}, which may be seconds later; take it from the "
-                    "labels and the participant file, whose stamps are right, and leave it out",
+                    f"{LEARNT_LATE[str(each.value)]}, which may be seconds later; use the labels "
+                    "and the participant file, whose timestamps are right, and remove it here",
                 )
 
 

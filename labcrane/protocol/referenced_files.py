@@ -50,7 +50,7 @@ def named_files(every: Iterable[Settings], folder: Path) -> dict[str, dict[str, 
 def used(path: Path) -> list[Path]:
     """Return the files that a YAML file of the study uses, and those that these use.
 
-    They are named from beside it: ``use: parts/car.yaml``, ``mesh: boulder.obj``.
+    Their paths are relative to it: ``use: parts/car.yaml``, ``mesh: boulder.obj``.
     """
     found: dict[Path, None] = {}
     waiting = [path]

@@ -126,7 +126,7 @@ class ReferenceChecker:
             self._source.problem((*place, *at), f"{_dotted((*place, *at))}: {error}")
 
     def _check_sections(self) -> None:
-        """Look up the files that the protocol names beside its components."""
+        """Look up the files that the protocol names in addition to its components."""
         for place, section in self._sections.items():
             before = self._source.wrong
             for mention in mentioned(section):
@@ -327,7 +327,7 @@ class ReferenceChecker:
 
 
 def _is_status(axis: str) -> bool:
-    """Whether a number of an input says that a device is there, which nobody moves or presses."""
+    """Whether a number of an input states that a device is connected; no hand changes it."""
     return axis.rsplit(".", maxsplit=1)[-1] == "connected"
 
 

@@ -35,7 +35,7 @@ class Section(Settings):
 class Block(Section):
     """A run of trials of one task.
 
-    Keys beside these limit how many levels of a factor are used: ``pairs: 2``.
+    Further keys limit how many levels of a factor are used: ``pairs: 2``.
     """
 
     model_config = ConfigDict(

@@ -1,4 +1,4 @@
-"""Streams of others that a protocol asks for, and how right their time must be."""
+"""External streams that a protocol asks for, and the required accuracy of their time."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -117,7 +117,7 @@ class StreamNeed(Settings):
         return self.type is None or same_type(self.type, header.type)
 
     def treatment(self, header: "StreamHeader") -> "Treatment":
-        """Return how the stamps of a recorded stream are to be read."""
+        """Return how the timestamps of a recorded stream are to be interpreted."""
         from labcrane.streams.sync.correction import Treatment  # noqa: PLC0415
         from labcrane.streams.sync.dejitter import Dejitter  # noqa: PLC0415
         from labcrane.streams.sync.resync import treatment_of  # noqa: PLC0415
@@ -139,10 +139,10 @@ SHARES = frozenset({"missing", "late"})
 
 
 class TimeLimits(Settings):
-    """How right time stamps must be: beyond the first number a warning, beyond the second not."""
+    """Accuracy of timestamps: beyond the first number a warning, beyond the second a failure."""
 
     error_s: WarnLimit = Limits().error_s
-    """Uncertainty of corrected time stamps at 95 %, in seconds."""
+    """Uncertainty of corrected timestamps at 95 %, in seconds."""
 
     silent_s: WarnLimit = Limits().silent_s
     """From a required regular stream's last sample to the end of the recording, in seconds."""

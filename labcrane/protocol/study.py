@@ -339,7 +339,7 @@ class Checker:
                     yield ("sessions", number, "steps", at, next(iter(steps[at]))), step.block
 
     def _count(self, place: Place, block: Block, task: Task) -> None:
-        """Note a block of more trials than anybody does, which no plan could hold."""
+        """Note a block with more trials than the limit."""
         count = trials_of(block, self._protocol, task)[0]
         if count > MOST_TRIALS and not self._source.recorded:
             message = f"the block has {count:.0f} trials; the maximum is {MOST_TRIALS}: repeat less"

@@ -64,7 +64,7 @@ class UpDown(Settings):
 
 
 class QuestPlus(Settings):
-    """Always the level whose answer is expected to tell most (QUEST+, Watson 2017).
+    """Always the level whose answer is expected to be most informative (QUEST+, Watson 2017).
 
     Success is less likely the harder a level is: ``guess + (1 - guess - lapse) * Phi((threshold -
     level) / spread)``, Phi being the normal distribution's. Any threshold from the easiest to the
@@ -116,7 +116,7 @@ class Track(Settings):
     """QUEST+ chooses."""
 
     start: str = ""
-    """The first level; otherwise the easiest of a staircase, and the one that tells most of
+    """The first level; otherwise the easiest of a staircase, and the most informative of
     QUEST+."""
 
     rounds: Annotated[PositiveInt, AtMost(1000)] = 40

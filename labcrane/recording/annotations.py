@@ -103,7 +103,7 @@ def annotate(
     Raises
     ------
     RecordingError
-        It cannot be written there, or is none; what there was is as it was.
+        It cannot be written there, or is not valid; the file is then unchanged.
     """
     if not text.strip():
         raise RecordingError("an annotation cannot be empty; describe what it marks")

@@ -123,7 +123,7 @@ def clear(path: Path) -> None:
 
 
 def crash_marker_path(journal: Path) -> Path:
-    """Return where the file of a session is: beside its journal."""
+    """Return the path of a session's file, next to its journal."""
     return journal.with_suffix(".where")
 
 

@@ -41,18 +41,18 @@ class DataFolder:
 
     @property
     def name(self) -> str:
-        """The participant's name with its stamps."""
+        """The participant's name with its suffixes."""
         stamps = ["PILOT"] * self.pilot + ["SIMULATED"] * self.simulated
         return "-".join([self.participant, *stamps])
 
     @staticmethod
     def pseudonym(name: str) -> str:
-        """Return the pseudonym in a ``name`` with stamps."""
+        """Return the pseudonym in a ``name`` with suffixes."""
         return name.removesuffix("-SIMULATED").removesuffix("-PILOT")
 
     @staticmethod
     def is_simulated(name: str) -> bool:
-        """Say whether a ``name`` with stamps is of data that a program made."""
+        """Return whether a ``name`` with suffixes is of data that a program made."""
         return name.endswith("-SIMULATED")
 
     @property

@@ -33,7 +33,7 @@ SIGNAL = "signal"
 """A note of a fault of a signal that was found (``bad``), or that is there no more."""
 
 MONITORS = "monitors"
-"""A note of the monitors that look at the signal from now on; what others told has ended."""
+"""A note of the monitors that look at the signal from now on; reports of others have ended."""
 
 OPENED = "opened"
 """The first note of every part: its recorder began to receive the stream."""
@@ -47,7 +47,7 @@ TAKEN = "taken"
 """Which stream was taken where any of its type would have been."""
 
 UNSTAMPED = "unstamped"
-"""A note of samples that came without a stamp, and whose stamps are worked back."""
+"""A note of samples that came without a timestamp, and whose timestamps are reconstructed."""
 
 COUNTER_GAP = "counter gap"
 """A note of samples that the source's own counter left out; ``missing`` says how many."""
@@ -60,10 +60,10 @@ OWN_CLOCK_CHANNELS = (
     Channel("tick", "us"),
     Channel("offset", "s"),
 )
-"""The monotonic clock, one that nothing turns, and what turned it as adjtimex tells it."""
+"""The monotonic clock, one that nothing turns, and its adjustments as adjtimex reports them."""
 
 OWN_CLOCK = StreamHeader("labcrane|own clock", "labcrane.own_clock", OWN_CLOCK_CHANNELS, "double64")
-"""The one stream of a journal that is of its recorder, and not beside another one."""
+"""The one stream of a journal that is the recorder's own, not a companion of another."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class Note:
 
 @dataclass(frozen=True)
 class RecordedStream:
-    """One stream of others, all parts in order.
+    """One external stream, all segments in order.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class RecordedStream:
     offsets
         Clock offsets as XDF has them, shape ``(n_offsets, 2)``.
     own_clock
-        The recorder's clock beside one that nothing turns, shape ``(n_readings, 5)``, in the order
+        The recorder's clock and one that is never adjusted, shape ``(n_readings, 5)``, in the order
         of :data:`OWN_CLOCK_CHANNELS`; empty where the system has none.
     starts
         Index of the first sample, and of the first one after each time without any recorder.
@@ -125,7 +125,7 @@ class RecordedStream:
 
 
 def companion_headers(header: StreamHeader, number: int) -> dict[str, StreamHeader]:
-    """Return the headers of what is noted beside the stream with this number, by what they are."""
+    """Return the headers of the companions of the stream with this number, by kind."""
 
     def beside(kind: str, form: str, channels: tuple[Channel, ...]) -> StreamHeader:
         name, desc = f"{header.name}|{kind}", {"of": str(number)}
@@ -175,7 +175,7 @@ def _of_parts(streams: list[RecordedStream]) -> RecordedStream:
 
 
 def _all_stamped(streams: Sequence[RecordedStream]) -> list[RecordedStream]:
-    """Return what each part has of a stream, with stamps for samples that came without one."""
+    """Return each segment of a stream, with timestamps for samples that came without one."""
     received = [Received(each.time_raw, each.data, each.texts) for each in streams]
     found = []
     for at, stream in enumerate(streams):
@@ -297,7 +297,7 @@ def _told_once(
     """Return which notes of two recorders count, where both have recorded the same.
 
     What the first says counts, but for its signals: monitors are processes of their own, and the
-    first's may have begun late or died. The one whose monitors told more is believed.
+    first's may have begun late or died. The one whose monitors reported more is used.
     """
 
     def both(note: Note) -> bool:
@@ -344,7 +344,7 @@ def _merged(found: Union, before: npt.NDArray[Any], after: npt.NDArray[Any]) -> 
 
 
 def _arrivals(found: Union, before: FloatArray, after: FloatArray, *, overlap: bool) -> FloatArray:
-    """Return how many samples had come when: what the second tells once the first is silent."""
+    """Return how many samples had come when: the second's report once the first is silent."""
     first, second = _counted(before, found.first), _counted(after, found.second)
     if overlap and len(first):
         ahead = (second[:, 0] > first[-1, 0]) & (second[:, 1] > first[-1, 1])

@@ -1,4 +1,4 @@
-"""Frames into the journal: one row of numbers a tick, and the events beside it."""
+"""Frames into the journal: one row of numbers a tick, and its events."""
 
 import time
 from collections import deque
@@ -17,7 +17,7 @@ from labcrane.recording.journal import Column, SessionJournal
 from labcrane.types import FloatArray
 
 PHASES = tuple(Phase)
-"""The phases in the order of the numbers that stand for them in ``loop/phase``."""
+"""The phases in the order of their numbers in ``loop/phase``."""
 CODES: Mapping[Phase, float] = {phase: float(code) for code, phase in enumerate(PHASES)}
 
 LOOP = (
@@ -115,14 +115,14 @@ class FrameRow:
 
 
 AROUND_A_FRAME = 500
-"""Bytes that a frame takes in memory beside its numbers."""
+"""Bytes that a frame takes in memory in addition to its numbers."""
 
 
 class FrameLog:
-    """Writes frames through to the journal, each before anybody else sees it.
+    """Writes frames through to the journal, each before any other part sees it.
 
     When the disk refuses, frames wait in memory, in order, and are written as soon as it takes
-    them again: while ``trouble`` is set nobody should produce data that matter.
+    them again: while ``trouble`` is set, no data that matter should be produced.
 
     Parameters
     ----------

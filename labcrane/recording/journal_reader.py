@@ -183,7 +183,7 @@ def merge(files: Iterable[XdfFile]) -> SessionLog:
 
 
 def _joined(parts: Sequence[FloatArray]) -> FloatArray:
-    """Return all parts as one array; a single one as it is, for a copy takes as long as reading."""
+    """Return all segments as one array; a single one without copying, which is slow."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 

@@ -56,7 +56,7 @@ def parts(path: Path) -> list[Path]:
 
 
 def session_of(path: Path) -> tuple[int, str] | None:
-    """Return the session and the kind of a journal; None when a file is none."""
+    """Return the session and the kind of a journal; None when a file is not a journal."""
     named = _NAME.fullmatch(path.name)
     found = _JOURNAL.fullmatch(named["stem"]) if named else None
     return (int(found["session"]), found["kind"]) if found else None

@@ -41,7 +41,7 @@ def write_run(run: Run) -> str:
 
 
 def read_run(text: str) -> Run:
-    """Return the run that :func:`write_run` wrote, with nobody to steer."""
+    """Return the run that :func:`write_run` wrote, without control of the session."""
     found = _codec().validate_json(text)
     return Run(
         rate_hz=found.rate_hz,

@@ -1,10 +1,10 @@
-"""Samples without a stamp: the rest of a chunk that was under way when a receiver connected.
+"""Samples without a timestamp: the rest of a chunk in flight when a receiver connected.
 
-LSL sends one stamp with a chunk, that of its first sample, and a receiver adds a period for each of
-the others. One that connects in the middle of a chunk has nothing to add to, begins at zero, and
-stamps what is left of the chunk with one period, two periods, ... (liblsl, data_receiver.cpp; known
-there as issue 161). The next chunk is stamped as ever. Another recorder that was connected before
-has the true stamps of the same samples.
+LSL sends one timestamp with a chunk, that of its first sample, and a receiver adds a period for
+each further sample. A receiver that connects in the middle of a chunk lacks the first timestamp. It
+counts from zero, and gives the rest of the chunk the timestamps of one period, two periods, ...
+(liblsl, data_receiver.cpp; known there as issue 161). The next chunk has correct timestamps again.
+Another recorder that was connected before has the true timestamps of the same samples.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from labcrane.recording.xdf.samples import Texts
 from labcrane.types import FloatArray
 
 JUMP_S = 1.0
-"""From a stamp that was counted from zero to the next one; a clock that began at zero goes on."""
+"""From a timestamp that was counted from zero to the next; a clock that began at zero continues."""
 
 TOLERANCE = 1e-6
 """Share of a period by which a sum of periods may be off a multiple."""
@@ -49,14 +49,14 @@ class Received:
 
 
 def unstamped(stamps: FloatArray, rate_hz: float) -> list[tuple[int, int]]:
-    """Return where stamps are counted from zero: first sample, and the one after the last.
+    """Return where timestamps are counted from zero: first sample, and the one after the last.
 
     Parameters
     ----------
     stamps
         As they came, in seconds, shape ``(n,)``.
     rate_hz
-        Nominal rate; 0 for a stream without one, whose samples then have the stamp 0.
+        Nominal rate; 0 for a stream without one, whose samples then have the timestamp 0.
     """
     period = 1.0 / rate_hz if rate_hz > 0.0 else 0.0
     slack = TOLERANCE * period
@@ -75,7 +75,7 @@ def unstamped(stamps: FloatArray, rate_hz: float) -> list[tuple[int, int]]:
 def stamped(
     mine: Received, rate_hz: float, others: Sequence[Received]
 ) -> tuple[FloatArray, list[tuple[int, int]]]:
-    """Return the stamps of a stream, with those of samples that came without one.
+    """Return the timestamps of a stream, with those of samples that came without one.
 
     They are what another recorder has of the same samples, to the bit; or are worked back from the
     chunk that follows, a period for each sample. Without a nominal rate they stay as they are.

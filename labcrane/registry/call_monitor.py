@@ -124,7 +124,7 @@ class CallMonitor:
         Raises
         ------
         PluginError
-            It raised something that is none of labcrane's errors, or wanted to end the process.
+            It raised an exception that is not an error of labcrane, or tried to end the process.
         """
         before, self._inside = self._inside, number
         self._number[0] = self._base + number
@@ -155,7 +155,7 @@ class CallMonitor:
         """Return ``function`` watched as by :meth:`call`, and what it returns by ``check``.
 
         Not ``closely``, it is not noted when and where it is called: for simulations, in which
-        nobody waits for a tick, and one that dies is made again.
+        no person waits for a tick, and a dead one is repeated.
         """
         if closely:
 

@@ -55,7 +55,7 @@ class OfferSheet:
     about
         What its settings' docstring says first.
     recorded
-        What it records with its default settings; None when it cannot be built without being told
+        What it records with its default settings; None when it cannot be built without knowing
         more.
     example
         How a protocol uses it, with every setting at its default.

@@ -77,7 +77,7 @@ def labcrane_questionnaires() -> Sequence[Offer[Questionnaire]]:
 
 @hookspec
 def labcrane_monitors() -> Sequence[Offer[SignalMonitor]]:
-    """Offer monitors that tell whether the signal of a stream is alive."""
+    """Offer monitors that check whether the signal of a stream is alive."""
     raise NotImplementedError
 
 

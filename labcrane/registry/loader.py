@@ -20,7 +20,7 @@ from labcrane.registry.traceback import told
 OfferT = TypeVar("OfferT")
 
 FOLDER = "plugins"
-"""Where a study keeps plugins of its own, beside its protocol."""
+"""Folder of a study's own plugins, next to its protocol."""
 
 
 OFFERS = f"{PROJECT}.offers"
@@ -38,7 +38,7 @@ class PluginModules:
     installed
         Instead of what is in the ``labcrane`` entry-point group.
     study
-        A protocol; the Python files in the folder ``plugins`` beside it are plugins too.
+        A protocol; the Python files in the folder ``plugins`` next to it are plugins too.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ def offered(implementation: pluggy.HookImpl, kind: type[OfferT], made_by: str) -
 
 
 def own_plugins(study: Path) -> dict[str, Path]:
-    """Return the plugins in the folder beside a protocol, by name: ``plugins/arrow.py``."""
+    """Return the plugins in the folder next to a protocol, by name: ``plugins/arrow.py``."""
     return {f"{FOLDER}/{path.name}": path for path in sorted((study.parent / FOLDER).glob("*.py"))}
 
 

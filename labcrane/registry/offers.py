@@ -41,7 +41,7 @@ class Offer(Generic[RoleT_co]):
     name
         The word a protocol writes after ``use:``.
     settings
-        Model of the keys beside it.
+        Model of the keys next to it.
     build
         Makes the component from settings and machine.
     examine
@@ -91,7 +91,7 @@ def offer(
     name
         One word, in lower case.
     settings
-        Model of the keys that a protocol may write beside ``use``.
+        Model of the keys that a protocol may write next to ``use``.
     build
         Called with validated settings and the machine, once per run. Import heavy libraries
         inside it: every installed plugin is imported just to list offers.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def watched(component: Component, name: str, plugin: str, call_monitor: CallMonitor) -> Component:
-    """Return ``component`` under a call monitor; what runs in a process of its own as it is."""
+    """Return ``component`` under a call monitor; a component in its own process stays unwrapped."""
     for role, entry in ROLES.items():
         if entry.returns is not None and isinstance(component, role):
             return _proxy_of(role)(component, f"{entry.word} {name!r}", plugin, call_monitor, entry)
@@ -34,7 +34,7 @@ def watched(component: Component, name: str, plugin: str, call_monitor: CallMoni
 def loosely_watched(components: Iterable[Component]) -> Iterator[None]:
     """Watch components less closely: whether each keeps its word, not when and where.
 
-    For simulations. Nobody waits for a tick of theirs, and one that dies is made again.
+    For simulations. No person waits for their ticks, and a dead one is repeated.
     """
     hasty = [component for component in components if isinstance(component, _Proxy)]
     for component in hasty:

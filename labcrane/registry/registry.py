@@ -123,7 +123,7 @@ def discover(plugins: Iterable[EntryPoint] | None = None, *, study: Path | None 
     plugins
         Instead of those that are installed.
     study
-        A protocol; the plugins in the folder beside it are collected as well.
+        A protocol; the plugins in the folder next to it are collected as well.
 
     Raises
     ------

@@ -110,7 +110,7 @@ def replay_session(
     Raises
     ------
     RecordingError
-        There is no such session, or it was resumed after a crash and is not of one piece.
+        There is no such session, or it was interrupted and resumed.
     ProtocolError
         The record's protocol cannot be run with what is installed.
     """

@@ -38,7 +38,7 @@ def restored_study(
     Parameters
     ----------
     protocol, machine
-        Files to take instead of the recorded ones; plugins beside a given protocol are imported.
+        Files to use instead of the recorded ones; plugins next to a given protocol are imported.
     run_code
         Whether plugins of the study in the recording are imported as well. They are programs of the
         file's author, so this needs the explicit request of a person.
@@ -150,7 +150,7 @@ def _write_instructions(content: Mapping[str, Any], record: SessionRecord, folde
 
 
 def _put_in_defaults(content: Mapping[str, Any], record: SessionRecord) -> None:
-    """Let recorded settings stand for those that were not written: defaults may be others by now.
+    """Use recorded settings for those that were not written: defaults may have changed.
 
     What a recording does not have either did not exist: plugins know what held in its place.
     """
@@ -170,7 +170,7 @@ def _complete(written: dict[str, Any], recorded: Mapping[str, Any]) -> None:
 
 
 def _put_in_questionnaires(content: Mapping[str, Any], record: SessionRecord) -> None:
-    """Let recorded settings stand for those that named a file, which is not there any more."""
+    """Use recorded settings for those that named a file that no longer exists."""
     components = record.context["components"]
     for name, written in content.get("questionnaires", {}).items():
         if recorded := components.get(f"questionnaires.{name}"):

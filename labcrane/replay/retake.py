@@ -1,4 +1,4 @@
-"""Pictures of a recorded session, taken afterwards by any camera: nobody had to record video.
+"""Pictures of a recorded session, taken afterwards by any camera, without recorded video.
 
 What is drawn are the recorded numbers, which a replay gives again bit for bit, the scene of each
 moment, and the machine as the recorded protocol describes it.
@@ -44,7 +44,7 @@ class _Draws(Protocol):
 class Retake:
     """Takes pictures of a recorded session; a context manager, since a hidden window is open.
 
-    In them are the machine, what stands around, and the task's targets; neither cues nor words.
+    They show the machine, its surroundings and the task's targets, but no cues or words.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ REPORTS: Mapping[str, Callable[[Mapping[str, Any]], Message]] = {
     "feedback.ready": lambda data: FeedbackReady(data["what"], data["facts"]),
     "launcher.gone": lambda data: LauncherGone(),
 }
-"""The report of which an event tells, by the event's name."""
+"""The report that an event belongs to, by the event's name."""
 
 
 class RecordOver(Exception):  # noqa: N818 - ends a loop and is not an error

@@ -1,4 +1,4 @@
-"""Fast path of a simulation: compiled twins make the ticks in which nothing happens.
+"""Fast path of a simulation: compiled kernels compute the ticks in which nothing happens.
 
 It is the loop's law and the loop's bits. Which of the two ran, and why, is noted of every
 participant.
@@ -28,11 +28,11 @@ class SimulatedBy:
     Attributes
     ----------
     compiled
-        Whether by twins; else by the loop.
+        Whether by compiled kernels; otherwise by the loop.
     why
-        Why not by twins; with them, what compiled them.
+        Why not by kernels; with them, the compiler.
     deviation
-        The largest difference to the loop that a twin allows itself; 0 for the same bits.
+        Largest allowed difference between a kernel and the loop; 0 for the same bits.
     """
 
     compiled: bool
@@ -41,7 +41,7 @@ class SimulatedBy:
 
 
 class FastForward:
-    """Makes ticks by twins, from a frame on; built when the rig is open.
+    """Computes ticks by kernels, from a frame on; built when the rig is open.
 
     Parameters
     ----------

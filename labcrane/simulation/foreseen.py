@@ -1,4 +1,4 @@
-"""Tests that the report of a study will make, told from its plan before anyone takes part."""
+"""Tests that the report of a study will make, derived from its plan before anyone takes part."""
 
 from collections.abc import Iterator
 from typing import Any

@@ -1,4 +1,4 @@
-"""Kernel of a simulation: many ticks by compiled twins; import it only where numba is."""
+"""Kernel of a simulation: many ticks by compiled kernels; import it only where numba is."""
 
 import math
 import random

@@ -136,7 +136,7 @@ class Population(Section):
         Raises
         ------
         ProtocolError
-            A value that was drawn is none that the operator can have.
+            A sampled value is impossible for the operator.
         """
         own = self.drawn(study, participant, group)
         choice = study.operator
@@ -266,7 +266,7 @@ def _impossible(study: Study, name: str, value: float) -> str:
 
 
 def _why_no_factor(study: Study, name: str, factor: float, values: Sequence[float]) -> str:
-    """Return why nobody of a group can have a setting, multiplied; nothing where they can."""
+    """Return why no member of a group can have a setting, multiplied; empty where they can."""
     for value in values:
         why = "" if _impossible(study, name, value) else _impossible(study, name, factor * value)
         if why:

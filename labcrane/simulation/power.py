@@ -55,7 +55,7 @@ class Effect:
 
 
 def read_effect(text: str) -> Effect:
-    """Read an effect as it is written on the command line."""
+    """Read an effect from the command line."""
     found = _EFFECT.fullmatch(_BLANKS.sub(r"\1", text.strip()))
     try:
         size = float(found[7]) if found and found[7] else None
@@ -97,7 +97,7 @@ class Claim:
             self.kind == "non_inferiority" and self.margin == 0.0
         ):
             raise ProtocolError(
-                f"{self.kind} is shown against a margin, and {self.margin:g} is none; give "
+                f"{self.kind} is shown against a margin, and {self.margin:g} is not one; give "
                 "--margin in the unit of the effect"
             )
 
@@ -125,7 +125,7 @@ DIFFERENCE = Claim()
 
 @dataclass(frozen=True, slots=True)
 class Tested:
-    """What a test works out of each cohort, in the unit of the effect; shapes ``(cohorts,)``.
+    """Estimates of a test for each cohort, in the unit of the effect; shapes ``(cohorts,)``.
 
     Attributes
     ----------
@@ -219,7 +219,7 @@ def make_pool(
 
 
 def people_of(movements: "pd.DataFrame") -> dict[str, str]:
-    """Return everybody who has a movement, and their group; "" where there are none."""
+    """Return all participants with a movement, and their group; "" without groups."""
     if GROUP not in movements:
         return dict.fromkeys(movements["participant"].unique(), "")
     return dict(movements.groupby("participant")[GROUP].first())
@@ -444,7 +444,7 @@ def summarise(
 
 
 def _effect_of(pool: Pool) -> float:
-    """Return the effect in the whole pool, in its unit; of each group as many stand for it."""
+    """Return the effect in the whole pool, in its unit; each group has the same weight."""
     numbers = pool.means @ pool.weights
     if pool.groups is None:
         there = np.isfinite(numbers)

@@ -1,6 +1,6 @@
 """Rehearsal: one trial of every block for every group, without people, equipment or a record.
 
-What only running finds is found before anybody sits down: the study's own plugins are built and
+It finds before a session what only running finds: the study's own plugins are built and
 called as in a session, in its order, on a clock that does not wait. All other trials of the planned
 participants are begun and not run: a scene is placed by the seed of its trial, and can fit for most
 of them.
@@ -204,7 +204,7 @@ def _cause(error: Exception) -> str:
 
 
 def _unplanned(study: Study, name: str, number: int, slot: int) -> Place:
-    """Return the step of a session that cannot be planned; the session if it is none of them."""
+    """Return the step of a session that cannot be planned; the session if all can."""
     planner = Planner(study, name, number, slot)
     for at, step in enumerate(study.protocol.sessions[number - 1].steps):
         try:

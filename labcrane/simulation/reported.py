@@ -76,7 +76,7 @@ class PlannedTest:
     factors
         What varies in the study.
     people
-        Everybody who may be drawn, and their group: also who has no result, as who drops out.
+        All participants who may be sampled, and their group, including dropouts without a result.
     """
 
     kind: Kind
@@ -145,7 +145,7 @@ def plan_test(
     claim: Claim,
     people: Mapping[str, str] | None = None,
 ) -> PlannedTest:
-    """Return a planned test, tried once on everybody.
+    """Return a planned test, tried once on the whole pool.
 
     Parameters
     ----------

@@ -68,8 +68,8 @@ class SimulationJob:
     data
         Where the participants' folders go.
     loop
-        Why the loop makes every tick; empty lets compiled twins make those that they can. The bits
-        are the same.
+        Why the loop computes every tick; empty lets compiled kernels compute those that they can.
+        The bits are the same.
     """
 
     protocol: Path
@@ -85,7 +85,7 @@ class SimulationJob:
 
 
 class Attendance:
-    """A console at which nobody sits; the participant may leave in a trial.
+    """A console without a person; the participant may leave in a trial.
 
     Attributes
     ----------
@@ -280,7 +280,7 @@ def _sweep(data: Path) -> None:
 
 
 def _too_short(study: Study, participant: str) -> str:
-    """Return why the loop is sooner done than twins are loaded; empty when it is not.
+    """Return why the loop is faster than loading compiled kernels; empty when it is not.
 
     By all who are planned: who is simulated later must not be noted otherwise.
     """

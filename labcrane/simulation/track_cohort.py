@@ -131,7 +131,7 @@ def abilities(
 
 
 def observe(track: PlannedTrack, people: Sequence[Ability], seed: int) -> "pd.DataFrame":
-    """Lead everybody through a block; return a row each.
+    """Lead all operators through a block; return a row each.
 
     Columns are ``threshold`` and ``spread`` as they were drawn, ``truth``, what the track is after,
     ``estimate``, ``sd``, ``trials`` and whether it ``ended`` before all rounds were done.

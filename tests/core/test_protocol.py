@@ -75,7 +75,7 @@ def test_the_protocol_of_these_tests_is_fine(complaint) -> None:
         ("rate_hz: 240", "rat_hz: 240", "5:1: 'rat_hz' is not a key of the file; did you mean 'rate_hz'?"),
         ("rate_hz: 240", "rate_hz: -5", "5:10: rate_hz is -5; it must be greater than 0 Hz"),
         ("rate_hz: 240", "rate_hz: fast", "5:10: rate_hz is 'fast'; it must be a number in Hz, or one with its unit, as 1 kHz"),
-        ("machine: ch8", "machine: ch9", "6:10: no machine is called 'ch9'; did you mean 'ch8'? labcrane has ch8, ch8_cranelike, and a file beside the protocol may end in .yaml"),
+        ("machine: ch8", "machine: ch9", "6:10: no machine is called 'ch9'; did you mean 'ch8'? labcrane has ch8, ch8_cranelike, or name a .yaml file in the protocol's folder"),
         ("use: dual_joystick", "use: dual_joistick", "7:14: input 'dual_joistick' is not installed; did you mean 'dual_joystick'? (labcrane plugins lists all)"),
         ("use: kinematic_crane", "use: kinematic_crane, actuatr: ideal", "11:34: 'actuatr' is not a key of dynamics; did you mean 'actuator'?"),
         ("distances: [2, 3]", "distances: [2, -3]", "13:40: tasks.aiming.distances[2] is -3; it must be greater than 0 m"),

@@ -209,7 +209,7 @@ WRONG = {
     "draco": (changed("extensionsRequired", to=["KHR_draco_mesh_compression"]), "needs the ext"),
     "old": (changed("asset", "version", to="1.0"), r"asset\.version"),
     "nowhere": (changed("nodes", 0, "scale", to=[1e300, 1e300, 1e300]), "position is not"),
-    "no turn": (changed("nodes", 0, "rotation", to=[0, 0, 0, 0]), "rotation is none"),
+    "no turn": (changed("nodes", 0, "rotation", to=[0, 0, 0, 0]), "is not a rotation"),
     "outside": (changed("buffers", 0, "uri", to="../secret.bin"), "not a file next to it or below"),
     "password": (changed("buffers", 0, "uri", to="/etc/passwd"), "not a file next to it or below"),
     "network": (changed("buffers", 0, "uri", to="http://x.org/a"), "must be in files next to it"),
@@ -310,7 +310,7 @@ def test_a_polygon_is_a_fan_and_corners_need_not_name_normals(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("line", "why"),
     [
-        ("f 1 2 9", "corners that are none of its 3 points"),
+        ("f 1 2 9", "corners that are not among its 3 points"),
         ("f 1 2 -9", "a corner in line 4 that refers to no point"),
         ("f 1 2 0", "a corner in line 4 that refers to no point"),
         ("f 1//1/1 2//1 3//1", "a corner in line 4 that refers to no point"),

@@ -136,7 +136,7 @@ def machine_fields(
     rest_deg
         Angles at which a session begins, by the study's names; 0, or the nearest limit, otherwise.
     thickness
-        Of the beams that stand for links without a mesh, in m.
+        Of the beams that replace links without a mesh, in m.
 
     Raises
     ------

@@ -45,7 +45,7 @@ class MachineDescription(StrictModel):
     """Largest joint torques, in newton metres, instead of the file's."""
 
     thickness: PositiveFloat = 0.1
-    """Height and width of the beams that stand for links, in metres."""
+    """Height and width of the beams that replace links, in metres."""
 
     meshes: bool = True
     """Whether links look like the first mesh that a URDF file gives them: STL, OBJ or glTF."""

@@ -68,7 +68,7 @@ class MjcfFile:
     ) -> Sequence[Axis]:
         """Return joints by the study's names, which are the keys of ``names``, outward to the tip.
 
-        ``speeds`` in rad/s and ``efforts`` in N m stand for limits that the file lacks.
+        ``speeds`` in rad/s and ``efforts`` in N m replace limits that the file lacks.
         """
         for name in names.values():
             if name not in self.joint_names:

@@ -1,6 +1,6 @@
-"""XML of a robot's description, looked at before anybody builds something of it.
+"""XML of a robot's description, checked before a robot is built from it.
 
-URDF and MJCF come from elsewhere: a few lines of them may stand for millions of bodies, and name
+URDF and MJCF come from elsewhere: a few of their lines may expand to millions of bodies, and name
 files anywhere on the disk.
 """
 
@@ -69,7 +69,7 @@ class _Look:
         return root
 
     def _walk(self, root: ElementTree.Element, times: float) -> None:
-        """Count elements, each as often as it is repeated; nothing here calls itself by depth."""
+        """Count elements, each as often as it is repeated, without recursion."""
         waiting = [(root, times)]
         while waiting:
             element, often = waiting.pop()
@@ -105,7 +105,7 @@ class _Look:
 
 
 REPEATED = ("replicate", "composite", "flexcomp")
-"""Elements of MJCF that stand for many."""
+"""Elements of MJCF that expand to many."""
 
 FILES = ("file", "content_type_file", *(f"file{side}" for side in ("right", "left", "up", "down")))
 """Attributes of MJCF that name a file."""

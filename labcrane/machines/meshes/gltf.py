@@ -1,4 +1,4 @@
-"""GlTF 2: meshes in a tree of nodes, as JSON beside its numbers or in one file with them."""
+"""GlTF 2: meshes in a tree of nodes, as JSON with separate numbers or in one file with them."""
 
 import base64
 import binascii
@@ -126,7 +126,7 @@ def read_gltf(data: bytes, folder: Path, inside: bytes = b"") -> list[Surface]:
     Parameters
     ----------
     folder
-        Where it lies; files with its numbers are beside it or below.
+        Its folder; files with its numbers are there or below.
     inside
         The numbers that came in the same file.
 
@@ -252,7 +252,7 @@ class _File:
         return self._buffers[number]
 
     def _fetched(self, uri: str) -> bytes:
-        """Return what an address holds: itself, or a file beside the mesh, and nothing else."""
+        """Return the data at an address: inline, or a file in the mesh's folder or below."""
         if uri.startswith("data:"):
             head, _, text = uri.partition(",")
             if not head.endswith(";base64"):
@@ -284,7 +284,7 @@ def _matrix(node: _Node) -> FloatArray:
     x, y, z, w = node.rotation
     square = x * x + y * y + z * z + w * w
     if not SINGULAR < square < 1.0 / SINGULAR:
-        raise MeshError("has a node whose rotation is none")
+        raise MeshError("has a node whose rotation is not a rotation")
     length = math.sqrt(square)
     matrix = np.eye(4)
     turn = rotation_matrix((x / length, y / length, z / length, w / length))

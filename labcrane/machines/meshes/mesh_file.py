@@ -1,4 +1,4 @@
-"""A mesh that something looks like: a file beside the one that names it."""
+"""A mesh for display: a file in the folder of the one that names it."""
 
 from pathlib import Path
 from typing import Annotated, Any

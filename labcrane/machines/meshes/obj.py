@@ -33,7 +33,7 @@ def read_obj(data: bytes) -> Surface:
     Raises
     ------
     MeshError
-        A line is none of an OBJ file with flat polygons, or names points that are not there.
+        A line does not belong to an OBJ file with flat polygons, or refers to missing points.
     """
     points, normals, corners, named = array("d"), array("d"), array("q"), array("q")
     polygons = array("q")

@@ -1,4 +1,4 @@
-"""Solids of a mesh: the pieces without hollows that it is made of, as engines touch them."""
+"""Collision geometry of a mesh: the convex pieces that it consists of."""
 
 import math
 from collections.abc import Iterator

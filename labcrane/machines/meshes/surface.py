@@ -42,15 +42,15 @@ class Surface:
 
 
 def doubles(numbers: npt.ArrayLike) -> FloatArray:
-    """Return numbers as of 64 bits; of those that are none, silently, as :class:`Surface` looks."""
+    """Return numbers with 64 bits; without warnings for NaN, which :class:`Surface` refuses."""
     with np.errstate(invalid="ignore"):
         return np.asarray(numbers).astype(np.float64)
 
 
 def check_corners(corners: Corners, count: int) -> None:
-    """Raise :class:`MeshError` where a corner is none of ``count`` points."""
+    """Raise :class:`MeshError` where a corner is not one of ``count`` points."""
     if corners.size and (corners.min() < 0 or corners.max() >= count):
-        raise MeshError(f"has triangles with corners that are none of its {count} points")
+        raise MeshError(f"has triangles with corners that are not among its {count} points")
 
 
 def check_triangles(count: int) -> None:

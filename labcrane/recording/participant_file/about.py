@@ -42,7 +42,7 @@ Each group ses-01, ses-02 ... is a session:
   questionnaires   what was answered
   streams          signals of other devices: time is on the session's clock, time_raw is not
   context          all that was known at the start, as JSON: versions, settings, units
-  sync_report      how right the times are
+  sync_report      accuracy of the times
 dataset_description is JSON-LD of schema.org; CITATION says how to cite the software.
 
 Python  h5py.File(path)["ses-01/state/joint/angle/slew"][:], or labcrane.open_recording(path)

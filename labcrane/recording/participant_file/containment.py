@@ -23,7 +23,7 @@ MOST_PACKED = 1100
 """Bytes that one byte of gzip can become, and a little more."""
 
 MOST_CHUNK_BYTES = 1 << 26
-"""Of one packed piece of a column, which is unpacked whole for the first of its values: labcrane
+"""Of one packed chunk of a column, which is unpacked whole for the first of its values: labcrane
 writes none beyond a sixty-fourth of it."""
 
 SMALL_BYTES = 1 << 16
@@ -132,7 +132,7 @@ def check_texts(file: "h5py.File", path: Path) -> None:
 
 
 def unpacked(file: "h5py.File", size: int) -> list[_Span]:
-    """Return the stretches of a file of ``size`` bytes that no packed column takes."""
+    """Return the spans of a file of ``size`` bytes that no packed column takes."""
     return _outside(_columns_in(file), size)
 
 
@@ -176,7 +176,7 @@ def _outside(spans: list[_Span], size: int) -> list[_Span]:
 
 
 def _found(data: BinaryIO, start: int, stop: int) -> Iterator[tuple[int, bytes]]:
-    """Yield where heaps and texts begin in a stretch of a file, and how."""
+    """Yield where heaps and texts begin in a span of a file, and how."""
     while start < stop:
         data.seek(start)
         window = data.read(min(stop - start + _LONGEST, WINDOW))
@@ -279,7 +279,7 @@ class _Walk:
             )
         chunk = math.prod(dataset.chunks or ()) * width
         if chunk > MOST_CHUNK_BYTES:
-            raise self._refused(where, f"is packed in pieces of {chunk} bytes")
+            raise self._refused(where, f"is packed in chunks of {chunk} bytes")
         if dataset.dtype.kind == "O" and dataset.chunks is None and size:
             self._texts(dataset, where, size)
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import h5py
 
 ANSWER, END, SCORE = "questionnaire.answer", "questionnaire.end", "score."
-"""Events that hold answers and scores, and what stands before a score's name."""
+"""Events with answers and scores, and the prefix of a score's name."""
 
 TEXTS, NUMBERS = ("questionnaire", "kind", "item", "text"), ("value", "time", "step", "trial")
 

@@ -259,7 +259,7 @@ class Stream:
             return StreamHeader.from_xml(text_of(file[self._group].parent["header"]))
 
     def _beside(self, name: str) -> FloatArray | None:
-        """Return a column beside the corrected time; None where there is none."""
+        """Return a column next to the corrected time; None where there is none."""
         path = f"{self._time.rpartition('/')[0]}/{name}"
         with reading(self._path) as file:
             return np.asarray(file[path][:], np.float64) if path in file else None
@@ -285,7 +285,7 @@ class SessionRecord:
 
     @cached_property
     def streams(self) -> dict[str, Stream]:
-        """Frames as loop, input, command, state and task; streams of others by their names."""
+        """Frames as loop, input, command, state and task; external streams by their names."""
         with reading(self._path) as file:
             group = file[self._group]
             own = {
@@ -388,7 +388,7 @@ class SessionRecord:
 
     @cached_property
     def sync_report(self) -> dict[str, Any]:
-        """How right the time stamps are, and what to do where they are not; empty if unknown."""
+        """Accuracy of the timestamps, with remedies where it fails; empty if unknown."""
         with reading(self._path) as file:
             if SYNC_REPORT not in file[self._group]:
                 return {}

@@ -39,7 +39,7 @@ Rename = Callable[[str], str]
 
 
 def renaming(old: str, new: str) -> Rename:
-    """Return a function that puts ``new`` where ``old`` stands as a word of its own."""
+    """Return a function that replaces ``old`` by ``new`` where it is a word of its own."""
     pattern = re.compile(rf"(?<![A-Za-z0-9]){re.escape(old)}(?![A-Za-z0-9])")
     return lambda text: pattern.sub(new, text)
 

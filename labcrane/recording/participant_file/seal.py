@@ -33,7 +33,7 @@ def sealed(data: BinaryIO, size: int) -> int | None:
 
 
 def seal(path: Path, spans: Iterable[Span]) -> None:
-    """Put the sum of some stretches of a file behind its end."""
+    """Append the checksum of some spans of a file to its end."""
     size = path.stat().st_size
     with path.open("r+b") as data:
         total = sum_of(data, spans)
@@ -42,7 +42,7 @@ def seal(path: Path, spans: Iterable[Span]) -> None:
 
 
 def check_seal(data: BinaryIO, path: Path, size: int, spans: Iterable[Span]) -> None:
-    """Compare the sum that a file ends with, if it does, with that of its stretches.
+    """Compare the checksum at a file's end, if there is one, with that of its spans.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def check_seal(data: BinaryIO, path: Path, size: int, spans: Iterable[Span]) -> 
 
 
 def sum_of(data: BinaryIO, spans: Iterable[Span]) -> int:
-    """Return the CRC-32 of stretches of a file."""
+    """Return the CRC-32 of spans of a file."""
     total = 0
     for start, stop in spans:
         data.seek(start)

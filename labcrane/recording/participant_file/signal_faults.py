@@ -39,7 +39,7 @@ class FaultTime:
 
 
 def fault_times(stream: RecordedStream) -> Iterator[FaultTime]:
-    """Yield the faults that the recorder noted beside a stream, as they end."""
+    """Yield the faults that the recorder noted for a stream, as they end."""
     began: dict[tuple[str, str], tuple[float, str]] = {}
 
     def ended(key: tuple[str, str], end: float) -> FaultTime:

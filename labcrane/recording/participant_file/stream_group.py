@@ -1,4 +1,4 @@
-"""Groups of the streams of others in a session of a participant file, written."""
+"""Writing of the groups of external streams in a session of a participant file."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,7 +35,7 @@ BASES = ("probes", "arrivals", "nothing")
 
 
 def write_streams(group: "h5py.Group", streams: Sequence[RecordedStream]) -> None:
-    """Write all streams; those without a sample as well, so that nobody misses them silently."""
+    """Write all streams, also those without a sample, so that none is missing unnoticed."""
     if not streams:
         return
     all_streams = group.create_group("streams")
@@ -69,7 +69,7 @@ def _write_stream(group: "h5py.Group", stream: RecordedStream) -> None:
 
 
 def stream_attributes(stream: RecordedStream) -> dict[str, str | float]:
-    """Return what of a stream's header stands at its group."""
+    """Return the attributes of a stream's group, from its header."""
     header = stream.header
     return {
         "name": header.name,
@@ -107,7 +107,7 @@ def stream_columns(
 def write_time(
     group: "h5py.Group", columns: Mapping[str, FloatArray], quality: Mapping[str, float | str]
 ) -> None:
-    """Write a stream's corrected times, and beside them how right they are.
+    """Write a stream's corrected times, with their uncertainty.
 
     Times that were there before are kept below ``earlier``, oldest first, unless they are the same.
 

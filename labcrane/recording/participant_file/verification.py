@@ -97,7 +97,7 @@ def _path(column: Column) -> str:
 
 
 def _marked(node: "h5py.HLObject", marks: Mapping[str, Any]) -> bool:
-    """Whether a node has attributes; texts beyond what HDF5 takes are none."""
+    """Whether a node has attributes; texts too long for HDF5 do not count."""
     own = _attributes(node)
     return all(
         own.get(name, clean(value)) == clean(value)
@@ -128,7 +128,7 @@ def _unlike_frames(group: "h5py.Group", log: SessionLog) -> Iterator[str]:
 
 
 def _holds(dataset: "h5py.Dataset", values: FloatArray) -> bool:
-    """Whether a column holds just these values; compared in pieces, for memory's sake."""
+    """Whether a column holds just these values; compared in chunks, to save memory."""
     return dataset.shape == values.shape and all(
         np.array_equal(
             dataset[at : at + CHUNK],

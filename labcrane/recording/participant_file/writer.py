@@ -1,7 +1,8 @@
 """Writer of the participant file, from journals.
 
-HDF5 is never open for writing while people are recorded. Each session is added to a new file beside
-the old one, which is brought to the disk, read again, and only then takes the old one's name.
+HDF5 is never open for writing while people are recorded. Each session is added to a new file next
+to the old one. The new file is flushed to the disk, read again, and only then takes the old one's
+name.
 """
 
 import re
@@ -41,7 +42,7 @@ _HELD: ContextVar[tuple[Path, "h5py.File"] | None] = ContextVar("held", default=
 """The participant file that is kept open."""
 
 Conclude = Callable[["h5py.Group"], object]
-"""Works something out of a session's group in a participant file, and writes it there."""
+"""Computes results from a session's group in a participant file, and writes them there."""
 
 DAMAGED = (
     OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError,
@@ -60,7 +61,7 @@ class Consolidated:
     frames, events
         How many.
     streams
-        Samples per stream of others.
+        Samples per external stream.
     notes
         What was not as it should be in the journals, for people.
     """
@@ -105,10 +106,10 @@ def consolidate(
     path
         The participant file.
     journals
-        First parts of the session's journals; further parts beside them are found.
+        First segments of the session's journals; further segments next to them are found.
     conclude
-        Corrects the stamps of other clocks and makes the sync report, from what the session's group
-        holds; without it, streams hold raw stamps only.
+        Corrects the timestamps of other clocks and makes the sync report, from what the group
+        contains; without it, streams contain raw timestamps only.
 
     Raises
     ------
@@ -241,7 +242,7 @@ def opened(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
     Raises
     ------
     RecordingError
-        It cannot be read, or is none.
+        It cannot be read, or is not a participant file.
     """
     import h5py  # noqa: PLC0415
 
@@ -274,7 +275,7 @@ def reading(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
     Raises
     ------
     RecordingError
-        It cannot be read, is none, or is damaged where it was read.
+        It cannot be read, is not a participant file, or is damaged where it was read.
     """
     kept = _HELD.get()
     try:
@@ -301,7 +302,7 @@ def kept_open(path: Path) -> Iterator[None]:
     Raises
     ------
     RecordingError
-        It cannot be read, or is none.
+        It cannot be read, or is not a participant file.
     """
     with opened(path) as file, held(path, file):
         yield
@@ -326,7 +327,7 @@ def _refuse_less(path: Path, old: "h5py.File", session: _Session) -> None:
     if given < held:
         raise RecordingError(
             f"{path} holds {held:.0f} samples of session {session.number}, its journals only "
-            f"{given}; the file is left as it is, look for the missing segments of the journals"
+            f"{given}; the file is unchanged; look for the missing segments of the journals"
         )
 
 
@@ -339,7 +340,7 @@ def _verify(beside: Path, path: Path, session: _Session) -> None:
         for name in wrong:
             raise RecordingError(
                 f"{session.group}/{name} of {beside} is not what the journals hold; "
-                f"{path} is left as it is: check the disk"
+                f"{path} is unchanged: check the disk"
             )
         if path.exists():
             written = {session.group, *ABOUT}

@@ -1,4 +1,4 @@
-"""Checksums that tell which bytes of a journal are as they were written.
+"""Checksums that show which bytes of a journal are unchanged since they were written.
 
 XDF has no checksums, so labcrane writes a stream of its own, ``labcrane.check``. Each sample
 says where a chunk ends and what the CRC-32 of the file up to there is. Any stretch between two
@@ -63,7 +63,7 @@ class CheckLog:
         self.last = stamp
 
     def added(self, chunk: bytes, stamp: float) -> "CheckLog":
-        """Return the log with one chunk more; this one stays as it is."""
+        """Return the log with one chunk more; this one stays unchanged."""
         after = replace(self, entries=bytearray(self.entries))
         after.add(chunk, stamp)
         return after
@@ -85,7 +85,7 @@ class CheckLog:
 
 
 class ByteSpan(NamedTuple):
-    """A stretch of a file, in bytes."""
+    """A span of a file, in bytes."""
 
     start: int
     stop: int

@@ -22,7 +22,7 @@ class FileWindow(NamedTuple):
 
 
 class FileBytes:
-    """A file as long as it is now; what is appended afterwards is not seen.
+    """A file at its present length; bytes that are appended later are not seen.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class FileBytes:
         return -1
 
     def crc(self, start: int, stop: int, before: int = 0) -> int:
-        """Return the CRC-32 of a stretch behind bytes whose CRC-32 was ``before``."""
+        """Return the CRC-32 of a span that follows bytes whose CRC-32 was ``before``."""
         while start < stop:
             end = min(stop, start + WINDOW)
             data, at = self.window(start, end)

@@ -63,7 +63,7 @@ class StreamHeader:
     rate_hz
         Samples per second, 0 for an irregular stream.
     desc
-        What else is to be known, as nested names and texts; ends up beside the channels.
+        Further description, as nested names and texts, next to the channels.
     text
         The XML of a foreign stream as it came, written and returned unchanged.
     """
@@ -98,7 +98,7 @@ class StreamHeader:
 
     @property
     def host(self) -> str:
-        """The computer that sent it, as LSL knows it; empty where it is not told."""
+        """The computer that sent it, as LSL knows it; empty where that is missing."""
         found = re.search(r"<hostname>([^<]*)</hostname>", self.text or "")
         return found[1].strip() if found else ""
 
@@ -133,7 +133,7 @@ class StreamHeader:
 
 
 def _check_text(text: str) -> None:
-    """Refuse what takes long to read: entities, which can stand for gigabytes, and stairs."""
+    """Refuse headers that take long to read, by entities that expand to gigabytes or by depth."""
     check_size(len(text), "stream header", "it")
     if "<!" in text.replace("<!--", ""):
         raise LimitError("it holds a document type or entities, which LSL and XDF do not write")

@@ -32,7 +32,7 @@ class Samples(NamedTuple):
 def unpack(
     data: FileBytes, header: StreamHeader, chunks: Iterable[Chunk], skipped: list[ByteSpan]
 ) -> Samples:
-    """Unpack the stamps and texts of one stream; chunks that do not fit its header are skipped.
+    """Unpack the timestamps and texts of one stream; chunks that do not fit its header are skipped.
 
     Numbers stay in the file until they are asked for: :func:`numbers`.
     """
@@ -136,13 +136,13 @@ def _numbers(
 
 
 def _stamp(data: bytes, position: int, otherwise: float) -> tuple[float, int]:
-    """Return a sample's time stamp, deduced where it was left out, and where the values start."""
+    """Return a sample's timestamp, deduced where it was omitted, and where the values start."""
     flag = data[position] if position < len(data) else -1
     if flag == _STAMPED:
         (stamp,) = struct.unpack_from("<d", data, position + 1)
         return stamp, position + 9
     if flag != 0:
-        raise ValueError("neither a time stamp nor none")
+        raise ValueError("a time stamp that is neither given nor omitted")
     return otherwise, position + 1
 
 

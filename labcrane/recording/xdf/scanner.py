@@ -39,14 +39,14 @@ class Chunk(NamedTuple):
 
 
 class ChunkScanner:
-    """The chunks of a file, and the stretches that hold none.
+    """The chunks of a file, and the spans without any.
 
     Parameters
     ----------
     data
         The file.
     damaged, unchecked
-        What is known of it: stretches to leave out, and stretches that may be damaged.
+        Known facts about it: spans to leave out, and spans that may be damaged.
 
     Attributes
     ----------

@@ -16,7 +16,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class MyPartSettings(Settings):
-    """Settings of my_part; a protocol writes them beside ``use``."""
+    """Settings of my_part; a protocol writes them next to ``use``."""
 
     radius: PositiveFloat = 0.03
     """Of the line, in metres."""

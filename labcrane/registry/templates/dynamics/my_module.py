@@ -12,7 +12,7 @@ labcrane_api = 1
 
 
 class MyPartSettings(Settings):
-    """Settings of my_part; a protocol writes them beside ``use``."""
+    """Settings of my_part; a protocol writes them next to ``use``."""
 
     lag_s: PositiveFloat = 0.1
     """Time in which a joint reaches 63 % of the speed asked for, in seconds."""

@@ -13,7 +13,7 @@ class MyPartSettings(Settings):
     """Settings of my_part: ``labcrane export DATA --to my_part --set separator=;``."""
 
     separator: str = ","
-    """What stands between two columns."""
+    """Separator of two columns."""
 
 
 class MyPart(Exporter):

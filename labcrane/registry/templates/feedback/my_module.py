@@ -23,7 +23,7 @@ labcrane_api = 1
 
 
 class MyPartSettings(Settings):
-    """Settings of my_part; a protocol writes them beside ``use``."""
+    """Settings of my_part; a protocol writes them next to ``use``."""
 
     far: PositiveFloat = 4.0
     """Distance of tip and target, in metres, from which on it is dark."""

@@ -23,14 +23,14 @@ labcrane_api = 1
 
 
 class MyPartSettings(Settings):
-    """Settings of my_part; a protocol writes them beside ``use``."""
+    """Settings of my_part; a protocol writes them next to ``use``."""
 
     period_s: PositiveFloat = 4.0
-    """How long the wave takes that stands in for a hand, in seconds."""
+    """Period of the wave that replaces a hand, in seconds."""
 
 
 class MyPart(InputDevice):
-    """Two sticks. A wave stands in for the device until you read a real one."""
+    """Two sticks. A wave replaces the device until you read a real one."""
 
     signals = (Signal("left", "1", ("x", "y")), Signal("right", "1", ("x", "y")))
 

@@ -12,7 +12,7 @@ labcrane_api = 1
 
 
 class MyPartSettings(Settings):
-    """Settings of my_part; a protocol writes them beside ``use``."""
+    """Settings of my_part; a protocol writes them next to ``use``."""
 
     largest: PositiveFloat = 100.0
     """Largest value that is believed, in the unit of the stream."""

@@ -11,7 +11,7 @@ labcrane_api = 1
 
 
 class MyPartSettings(Settings):
-    """Settings of my_part; a protocol writes them beside ``use``."""
+    """Settings of my_part; a protocol writes them next to ``use``."""
 
     steps: int = Field(default=7, ge=2, le=101)
     """How many answers each scale has."""

@@ -16,7 +16,7 @@ Axis = Annotated[str, Reference("axis")]
 
 
 class MyPartSettings(Settings):
-    """Settings of my_part; a protocol writes them beside ``use``."""
+    """Settings of my_part; a protocol writes them next to ``use``."""
 
     axes: Annotated[tuple[Axis, ...], Once()] = ("left.x", "right.y", "left.y", "right.x")
     """The axis that turns each joint, in the order of the machine's joints."""

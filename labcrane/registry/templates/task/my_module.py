@@ -13,7 +13,7 @@ labcrane_api = 1
 
 
 class MyPartSettings(Settings):
-    """Settings of my_part; a protocol writes them beside ``use``."""
+    """Settings of my_part; a protocol writes them next to ``use``."""
 
     heights: tuple[float, ...] = (0.5, 1.5)
     """Heights of the targets above the base, in metres; each is one trial."""

@@ -11,14 +11,14 @@ labcrane_api = 1
 
 
 class MyPartSettings(Settings):
-    """Settings of my_part; a protocol writes them beside ``use``."""
+    """Settings of my_part; a protocol writes them next to ``use``."""
 
     device: Path = Path("/dev/null")
     """What codes are written to."""
 
 
 class MyPart(Trigger):
-    """Writes every code as one byte. A file stands in for the device until you open a real one."""
+    """Writes every code as one byte. A file replaces the device until you open a real one."""
 
     def __init__(self, settings: MyPartSettings) -> None:
         self.codes = {"trial.start": 1, "trial.end": 2}
