@@ -1,4 +1,4 @@
-"""Complaints of pydantic in the words of those who write YAML: what is there, and what must be."""
+"""Complaints of pydantic in the terms of YAML: the value in the file, and the allowed ones."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -62,7 +62,7 @@ _COMMA = re.compile(r"\s*-?\d+,\d+\s*")
 
 @dataclass(frozen=True, slots=True)
 class Complaint:
-    """What is wrong, and where: with the value at a place, or with its key."""
+    """A mistake and its place: the value there, or its key."""
 
     place: Place
     message: str
@@ -141,7 +141,7 @@ def _meant(error: ErrorDetails) -> str | None:
 
 
 def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:
-    """Return what was written and what is possible, for one of pydantic's complaints."""
+    """Return the written value and the possible ones, for one of pydantic's complaints."""
     loc = error["loc"]
     key = loc[-1] if loc else named(place)
     if error["type"] == "extra_forbidden":
@@ -212,7 +212,7 @@ WANTED = {
     "path_type": "the name of a file",
     "finite_number": "a finite number: neither .nan nor .inf",
 }
-"""What each of pydantic's types is for people who write YAML."""
+"""Names of pydantic's types for people who write YAML."""
 
 BOUNDS = {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}
 

@@ -28,7 +28,7 @@ Spot = tuple[int, int]
 
 
 def misread(error: MarkedYAMLError, text: str) -> tuple[Spot, str]:
-    """Return line and column, from 1, and what is wrong there and what to do."""
+    """Return line and column, from 1, and the mistake with its remedy."""
     mark = error.problem_mark or error.context_mark
     line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
     problem, context = str(error.problem or ""), str(error.context or "")
@@ -154,7 +154,7 @@ _TAG = "tag:yaml.org,2002:"
 
 
 def unreadable(text: str, error: Exception) -> str:
-    """Return the place of the first value that is not what it looks like, and what to do.
+    """Return the place of the first value that does not fit its form or tag, and the remedy.
 
     A parser that stumbles over such a value says none. Where no value is found, what the parser
     said is returned without one.

@@ -18,7 +18,7 @@ LONGEST = 40
 ALLOWED = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9_-]*[A-Za-z0-9])?")
 
 STAMPS = ("PILOT", "SIMULATED")
-"""What is put after a pseudonym, with a hyphen, where no person's session was recorded."""
+"""Suffixes of a pseudonym, after a hyphen, for sessions that are not a participant's."""
 
 OURS = frozenset(
     [
@@ -69,7 +69,7 @@ DEVICES = frozenset(
     ["con", "prn", "aux", "nul", "conin", "conout", "clock"]
     + [f"{port}{number}" for port in ("com", "lpt") for number in range(10)]
 )
-"""What no file can be called on Windows, with any ending."""
+"""Names that no file can have on Windows, with any ending."""
 
 MISSING = frozenset(
     {
@@ -132,7 +132,7 @@ def misfit(name: str, *, person: bool = True) -> str | None:
 
 
 def twin_key(name: str) -> str:
-    """Return what two names have in common that some disk or format takes for the same.
+    """Return a key that is equal for two names that some disk or format treats as the same.
 
     Upper and lower case, forms of the same letter, and whatever is neither letter nor digit.
     """

@@ -12,7 +12,7 @@ PACKED = b"\x1f\x8b"
 
 
 def read_csv_text(path: Path) -> str:
-    """Return what a file with a CSV table holds, unpacked.
+    """Return the content of a file with a CSV table, unpacked.
 
     Raises
     ------

@@ -32,7 +32,7 @@ KINDS: Mapping[str, str] = {
     "uV": "a voltage",
     "px": "a number of pixels",
 }
-"""What is measured in the units that keys ask for."""
+"""Quantities that are measured in the units of keys."""
 
 ENDINGS: Mapping[str, str] = {
     "_deg_s": "deg/s",

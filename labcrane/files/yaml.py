@@ -253,7 +253,7 @@ DOCUMENTS = {
     b"\xd0\xcf\x11\xe0": "a Word document",
     b"%PDF": "a PDF",
 }
-"""What people write texts in that is not text, by its first bytes."""
+"""Document formats that are not plain text, by their first bytes."""
 
 AS_TEXT = "save it as plain text in UTF-8"
 

@@ -179,7 +179,7 @@ class Launcher:
                 self._say(line)
 
     def _orders(self) -> list[Command]:
-        """Return what people have ordered, but for what is for the recorder: that is done."""
+        """Return the actions of people, except those for the recorder, which are done here."""
         orders = self._console.commands()
         for command in orders:
             if command.order is Order.TAKE:

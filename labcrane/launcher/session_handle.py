@@ -46,7 +46,7 @@ class SessionHandle:
         self._process.tell(line)
 
     def wait(self, seconds: float) -> list[Event | Offered | SessionEnded]:
-        """Return what it has said, and wait so long for it."""
+        """Return its messages, and wait up to so long for them."""
         self._process.wait(seconds)
         return self._process.messages()
 
@@ -56,7 +56,7 @@ class SessionHandle:
         return self._process.ended
 
     def kill(self) -> None:
-        """End it at once: its journal is whole, and what it has said can still be asked for."""
+        """End it at once: its journal is intact, and its messages can still be read."""
         self._process.kill()
 
     def close(self) -> int:

@@ -48,7 +48,7 @@ def _named(key: Key) -> str:
 
 
 def monitor_config(visit: Visit) -> Mapping[str, Any] | None:
-    """Return what looks at a visit's streams; None where nothing does."""
+    """Return the monitors of a visit's streams; None where there are none."""
     study = visit.study
     if not study.protocol.streams or study.monitors == {}:
         return None

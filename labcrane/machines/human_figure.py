@@ -15,7 +15,7 @@ Extent = tuple[float, float]
 
 
 class ShapeKind(StrEnum):
-    """What a part is; capsules lie along x, and a hull is the solid around its points."""
+    """Shape of a part; capsules lie along x, and a hull is the solid around its points."""
 
     BOX = "box"
     CYLINDER = "cylinder"
@@ -38,7 +38,7 @@ class Geom:
     centre, yaw
         In the thing's frame, in m and rad.
     mesh
-        What it looks like instead.
+        Its visual geometry, if it is another one.
     points
         Corners of a hull, about its centre, in m.
     drawn

@@ -91,7 +91,7 @@ class Segment:
 
 
 def segments(placed: PlacedObject) -> tuple[Segment, ...]:
-    """Return what a thing consists of, each after the one that it hangs on."""
+    """Return the bodies of a thing, each after the one that it hangs on."""
     if not placed.jointed:
         return (Segment(placed.name, None, placed.parts, placed.mass),)
     parts: dict[str, tuple[Geom, ...]] = {}

@@ -59,7 +59,7 @@ class Joint(StrictModel):
     """Height and width of the link's beam, in metres."""
 
     mesh: Looks | None = None
-    """What the link looks like instead of a beam, in the frame at its far end: x along the link."""
+    """Visual geometry instead of a beam, in the frame at the far end of the link: x along it."""
 
     centre_m: tuple[float, float, float] | None = None
     """Centre of mass, in metres, from the joint: x along the link, y along the pitch axis, z up.
@@ -100,7 +100,7 @@ class Joint(StrictModel):
 
     @property
     def offset(self) -> float:
-        """What is added to the joint angle, in rad."""
+        """Offset that is added to the joint angle, in rad."""
         return math.radians(self.offset_deg)
 
 
@@ -108,7 +108,7 @@ class Machine(StrictModel):
     """A slewing base and a chain of pitch joints; positive pitch is down."""
 
     title: str
-    """What it is, for people."""
+    """Description for people."""
 
     source: str
     """Where the figures come from."""
@@ -117,7 +117,7 @@ class Machine(StrictModel):
     """Distance of the slew axis in front of the base frame's origin, in metres."""
 
     base_mesh: Looks | None = None
-    """What its foot looks like instead of a plate, in the base frame."""
+    """Visual geometry of its foot instead of a plate, in the base frame."""
 
     joints: tuple[Joint, ...]
     """From the base outward, three or more; the first one slews."""
@@ -177,7 +177,7 @@ class Body:
         What it moves with instead of a joint: its frame is then the state's ``MOVES.position`` and
         ``MOVES.orientation``, a quaternion x, y, z, w.
     mesh
-        What it looks like instead of a box, in that frame.
+        Visual geometry instead of a box, in that frame.
     """
 
     name: str

@@ -90,7 +90,7 @@ class SceneObject(StrictModel):
     """Where it may stand instead."""
 
     mesh: Looks | None = None
-    """What it looks like instead of its shape, in a frame at its centre; its touch is the same."""
+    """Visual geometry instead of its shape, in a frame at its centre; contact uses the shape."""
 
     _part: Part | None = PrivateAttr(default=None)
 
@@ -157,13 +157,13 @@ class Goal(StrictModel):
 
 
 class Scene(StrictModel):
-    """Everything around the machine, and what is to be done with it."""
+    """Everything around the machine, and the goals with it."""
 
     labcrane_scene: Literal[1]
     """Version of the format."""
 
     title: str
-    """What it is, for people."""
+    """Description for people."""
 
     things: dict[str, SceneObject] = Field(default_factory=dict)
     """Objects and obstacles by name."""
@@ -172,7 +172,7 @@ class Scene(StrictModel):
     """A lying person."""
 
     goals: tuple[Goal, ...] = Field(min_length=1)
-    """What is to be reached, in order; the last one ends the run."""
+    """Goals to be reached, in order; the last one ends the run."""
 
     start_deg: tuple[float, ...] | None = None
     """Joint angles at the start, in degrees; those of the machine at rest, by default."""

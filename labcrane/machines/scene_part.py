@@ -124,7 +124,7 @@ class Part(StrictModel):
     """Version of the format."""
 
     title: str
-    """What it is, for people."""
+    """Description for people."""
 
     shapes: dict[str, PartShape] = Field(min_length=1)
     """By name; forces are recorded, and limits hold, for each."""

@@ -14,12 +14,12 @@ from labcrane.machines.machine import Machine
 from labcrane.registry.registry import Registry, discover
 
 MACHINE = "ch8"
-"""What is operated where no study says it: monitors are built with a machine, as all components."""
+"""Default machine without a study: monitors are built with a machine, like all components."""
 
 
 @dataclass(frozen=True, slots=True)
 class MonitorConfig:
-    """What is to look at signals, ready for JSON.
+    """Configuration of the monitors of signals, ready for JSON.
 
     Attributes
     ----------

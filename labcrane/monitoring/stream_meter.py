@@ -43,7 +43,7 @@ class StreamReading:
     delay, largest_delay
         From its timestamp to its arrival, on the recorder's clock: median and maximum.
     offset, rtt
-        What is to be added to the source's clock, and the shortest round trip.
+        The offset to be added to the source's clock, and the shortest round trip.
     skew_ppm
         How fast its clock runs away, in parts per million.
     silent

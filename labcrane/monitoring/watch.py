@@ -31,7 +31,7 @@ END_S = 3.0
 
 @dataclass(frozen=True, slots=True)
 class StreamView:
-    """What there is to see of a stream now.
+    """Present state of a stream.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class StreamView:
     reading
         How it comes.
     faults
-        What is wrong with its signal.
+        Faults of its signal.
     watched
         Whether any monitor knows it.
     trouble
@@ -74,7 +74,7 @@ class WatchedInlet:
         self._threads[0].start()
 
     def view(self) -> StreamView:
-        """Return what there is to see now."""
+        """Return its present state."""
         signals = self._signals
         failed = signals.failed if signals else {}
         trouble = [*self._trouble, *(f"monitor {name!r}: {why}" for name, why in failed.items())]
@@ -152,7 +152,7 @@ class StreamWatch:
         self._inlets = [WatchedInlet(info, builder) for info in ordered]
 
     def views(self) -> list[StreamView]:
-        """Return what there is to see of each, by name."""
+        """Return the present state of each, by name."""
         return [inlet.view() for inlet in self._inlets]
 
     def close(self) -> None:

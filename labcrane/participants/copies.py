@@ -18,7 +18,7 @@ from labcrane.participants.proof import mentioned
 from labcrane.participants.register import Export, OwedRemoval, Register
 
 TABLES = {".csv": ",", ".tsv": "\t"}
-"""Files in which single rows can be taken out, and what separates their cells."""
+"""Files from which single rows can be removed, and the separators of their cells."""
 
 PARQUET, PACKED = ".parquet", ".gz"
 GZIP_HEAD = 512
@@ -41,7 +41,7 @@ class Reach:
     again
         Results computed from all participants' data that were removed: how to make them again.
     owed
-        What cannot be reached now: a disk that is not plugged in, a share that is offline.
+        Copies that cannot be reached now: on a disk that is not plugged in, or an offline share.
     """
 
     changed: list[str] = field(default_factory=list)

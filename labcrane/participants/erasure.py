@@ -30,7 +30,7 @@ from labcrane.participants.register import (
 
 @dataclass(frozen=True, slots=True)
 class Erased:
-    """What became of a participant's data.
+    """Outcome of erasing a participant's data.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ def forget_store(register: Register, participant: str) -> None:
 
 
 def mentions(places: Places, participant: str) -> tuple[list[str], list[str]]:
-    """Return files with the pseudonym in name or content, and what could not be searched for it.
+    """Return files with the pseudonym in name or content, and files that could not be searched.
 
     Of the data folder, and of all exports. What is packed is opened. The register is left out: it
     keeps the tombstone.

@@ -86,7 +86,7 @@ class Places:
 
 
 def entries(folder: Path) -> Iterator[Path]:
-    """Yield every file and folder below a folder; links, and what is behind them, are left out."""
+    """Yield every file and folder below a folder; links and their targets are left out."""
     for place, folders, files in os.walk(folder, followlinks=False):
         folders.sort()
         for name in sorted([*folders, *files]):
@@ -98,7 +98,7 @@ def entries(folder: Path) -> Iterator[Path]:
 def keep_private(folder: Path) -> None:
     """Remove the permissions of all other users on ``folder`` and its content.
 
-    Links, and what is behind them, are left as they are.
+    Links and their targets stay unchanged.
     """
     for path in (folder, *entries(folder)):
         wanted = PRIVATE_FOLDER if path.is_dir() else PRIVATE_FILE

@@ -1,4 +1,4 @@
-"""Places where a participant's data are: everything that labcrane has written, and what is due."""
+"""Places with a participant's data: everything that labcrane has written, and pending erasures."""
 
 from dataclasses import dataclass
 from pathlib import Path

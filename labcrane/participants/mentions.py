@@ -77,7 +77,7 @@ def _all_spellings(name: str) -> list[str]:
 
 
 def _letters(words: list[str]) -> re.Pattern[str]:
-    """Return what finds the beginning of every word, whatever is around it."""
+    """Return a pattern that finds the beginning of every word in any surroundings."""
     return re.compile("|".join(re.escape(word) for word in words) or r"(?!)")
 
 

@@ -20,7 +20,7 @@ PHONE_DIGITS = 7
 
 
 def personal(text: str) -> str | None:
-    """Return what in ``text`` could lead to a person, in words; None if nothing was found.
+    """Return the part of ``text`` that could identify a person, in words; None without one.
 
     E-mail addresses and telephone numbers are found, names are not: a program cannot tell. The
     loop asks, so the time it takes grows as the text does, and no faster.
@@ -52,7 +52,7 @@ _HDF5 = (".h5", ".hdf5")
 
 
 def personal_in(path: Path) -> Iterator[str]:
-    """Yield what in a file could lead to a person, in words with its place in the file.
+    """Yield parts of a file that could identify a person, in words with their places.
 
     E-mail addresses and telephone numbers in what people wrote, folders of a person's account and
     names of computers. Tables, JSON and HDF5 are read cell by cell, so that numbers and digests are

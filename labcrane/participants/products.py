@@ -104,7 +104,7 @@ def product(
     data
         The study's data folder, whose register keeps it.
     exporter
-        What writes: an exporter, or a command.
+        The writer: an exporter, or a command.
     target
         The folder in which the files are to be; others in it stay, those of the same name do not.
     people
@@ -164,7 +164,7 @@ def files_about(recording: Path, writer: str, target: Path) -> Iterator[Path]:
     recording
         The participant file, in its place in the data folder.
     writer
-        What writes: ``feedback preview``.
+        The writer: ``feedback preview``.
     """
     recording, target = recording.resolve(), target.resolve()
     data, name = recording.parent.parent, recording.parent.name
@@ -200,7 +200,7 @@ def _put(staging: Path, target: Path) -> None:
 
 
 def _settle(places: Places, exports: Sequence[Export], entry: Export) -> None:
-    """Note that nothing is being written any more, and what has come to be there."""
+    """Note that writing has ended, and the files that exist now."""
     for each in exports:
         if (each.folder, each.exporter) == (entry.folder, entry.exporter):
             each.staging = ""

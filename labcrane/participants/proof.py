@@ -53,7 +53,7 @@ CLOSED = {
     b"age-encryption.org": "it is encrypted by age",
     b"Salted__": "it is encrypted by OpenSSL",
 }
-"""What nothing here opens, by how it begins."""
+"""Formats that cannot be opened here, by their first bytes."""
 
 CLOSED_NAMES = (".gpg", ".pgp", ".age", ".enc", ".kdbx", ".hc", ".vc", ".aes", ".cpt", ".veracrypt")
 """Endings of files that are encrypted, and look like noise."""
@@ -65,7 +65,7 @@ ENCRYPTED_PACKAGE = "EncryptedPackage".encode("utf-16-le")
 
 @dataclass
 class Searched:
-    """What a search of one file came to.
+    """Result of the search of one file.
 
     Attributes
     ----------
@@ -199,7 +199,7 @@ _Opener = Callable[[_Search, BinaryIO, str, int], None]
 
 
 def _opener(file: BinaryIO, head: bytes) -> _Opener | None:
-    """Return what opens a file, by how it begins."""
+    """Return the function that opens a file, by its first bytes."""
     for begin, opens in OPENERS.items():
         if head.startswith(begin):
             return opens
@@ -268,7 +268,7 @@ def _hdf5(search: _Search, file: BinaryIO, name: str, depth: int) -> None:
 
 
 def _parts(dataset: Any) -> Iterator[Any]:
-    """Yield what a dataset holds, so many rows at a time."""
+    """Yield the content of a dataset, so many rows at a time."""
     if not dataset.shape:
         yield dataset[()]
         return
@@ -354,4 +354,4 @@ OPENERS: dict[bytes, _Opener] = {
     PARQUET: _parquet,
     MATLAB5: _matlab,
 }
-"""What opens a file, by how it begins."""
+"""Functions that open a file, by its first bytes."""

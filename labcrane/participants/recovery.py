@@ -47,7 +47,7 @@ def move(places: Places, store: Path) -> Transferred:
 
 
 def _finish(places: Places) -> tuple[Work | None, Erased | Reach | None]:
-    """Finish what was begun; return it, and what came of it."""
+    """Finish an interrupted operation; return it with its result."""
     work = read(places).work
     done: Erased | Reach | None = None
     if work is not None:

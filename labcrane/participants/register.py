@@ -99,7 +99,7 @@ class Export(Record):
 
     date: str
     exporter: str
-    """What wrote it: an exporter, or a command."""
+    """The writer: an exporter, or a command."""
     folder: str
     files: dict[str, list[str]]
     """The participants in each file, by its path in the folder; none in a shared file."""
@@ -112,7 +112,7 @@ class Export(Record):
 
 
 class Tombstone(Record):
-    """What is left of a participant who was erased."""
+    """Erasure record of a participant."""
 
     participant: str
     date: str
@@ -157,7 +157,7 @@ class Register(Record):
     format_version: Literal[1] = 1
     study: str = ""
     pattern: str = ""
-    """What pseudonyms of the study match."""
+    """Pattern of the study's pseudonyms."""
     participants: dict[str, Entry] = Field(default_factory=dict)
     exports: list[Export] = Field(default_factory=list)
     stores: dict[str, dict[str, str]] = Field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Session windows: when a participant may be run, and what the register keeps of it."""
+"""Session windows: when a participant may be run, and their entries in the register."""
 
 from datetime import date, timedelta
 

@@ -23,7 +23,7 @@ from labcrane.recording.participant_file.recover import is_recovered
 
 @dataclass
 class Transferred:
-    """What is in the store now.
+    """Present content of the store.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class Transferred:
     equal
         How many files are in the store, these included.
     only_here
-        What is not there, and why.
+        Missing files, and why.
     """
 
     copied: list[str] = field(default_factory=list)

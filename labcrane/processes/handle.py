@@ -53,7 +53,7 @@ class Patience:
 
 @dataclass
 class _Life:
-    """One process, and what it has said."""
+    """One process, and its messages."""
 
     process: "subprocess.Popen[bytes]"
     input: IO[bytes]
@@ -69,9 +69,9 @@ class ProcessHandle:
     Parameters
     ----------
     module
-        What it runs; it finds its parent by :class:`labcrane.processes.parent.Parent`.
+        Module that it runs; it finds its parent by :class:`labcrane.processes.parent.Parent`.
     name
-        What people call it.
+        Its name for people.
     patience
         How long it may take for what.
     take
@@ -146,7 +146,7 @@ class ProcessHandle:
         return not self._present.threads[0].is_alive()
 
     def messages(self) -> list[Any]:
-        """Return what it has said since the last call."""
+        """Return its messages since the last call."""
         return self._inbox.messages()
 
     def wait(self, seconds: float) -> bool:

@@ -14,7 +14,7 @@ MessageT = TypeVar("MessageT")
 
 
 class Inbox(Generic[MessageT]):
-    """What has come from a thread, until it is asked for."""
+    """Messages from a thread, until they are read."""
 
     def __init__(self) -> None:
         self._incoming: queue.SimpleQueue[MessageT] = queue.SimpleQueue()
@@ -50,7 +50,7 @@ class Inbox(Generic[MessageT]):
 
 
 def received(pipe: IO[bytes]) -> Iterator[Any]:
-    """Yield what is written at a pipe's other end, until that is closed or its process has died."""
+    """Yield the messages from a pipe's other end, until that is closed or its process has died."""
     while True:
         try:
             message = pickle.load(pipe)  # noqa: S301 - our own child, or our own parent

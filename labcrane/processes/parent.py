@@ -51,7 +51,7 @@ class Parent:
         self._outgoing.put(pickle.dumps(message))
 
     def messages(self) -> list[Any]:
-        """Return what the parent has said since the last call."""
+        """Return the parent's messages since the last call."""
         return self._inbox.messages()
 
     def wait(self, seconds: float | None = None) -> bool:
@@ -59,7 +59,7 @@ class Parent:
         return self._inbox.wait(seconds) or self.gone.is_set()
 
     def incoming(self) -> Iterator[Any]:
-        """Yield what the parent says, as it comes, until it is gone; for a thread of its own."""
+        """Yield the parent's messages as they come, until it is gone; for a thread of its own."""
         while not self.gone.is_set():
             self._inbox.wait()
             yield from self._inbox.messages()

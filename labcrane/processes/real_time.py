@@ -23,7 +23,7 @@ MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
 
 @dataclass(frozen=True, slots=True)
 class Granted:
-    """What the system has granted a loop, in words for the record.
+    """Priorities that the system has granted a loop, in words for the record.
 
     Attributes
     ----------

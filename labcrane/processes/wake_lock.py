@@ -37,7 +37,7 @@ ES_CONTINUOUS, ES_SYSTEM_REQUIRED, ES_DISPLAY_REQUIRED = 0x80000000, 0x1, 0x2
 
 @dataclass(frozen=True, slots=True)
 class WakeLock:
-    """Who keeps the screen awake, in words for the record.
+    """Services that keep the screen awake, in words for the record.
 
     Attributes
     ----------

@@ -35,7 +35,7 @@ class ComponentSpec:
     settings: Settings
     call_monitor: CallMonitor = field(default_factory=CallMonitor, compare=False)
     called: str = field(default="", compare=False)
-    """Where it is used, and what it is: ``study.yaml:7:14: input 'dual_joystick'``."""
+    """Its place in the protocol, and its name: ``study.yaml:7:14: input 'dual_joystick'``."""
 
     def described(self, folder: Path) -> dict[str, Any]:
         """Return it ready for JSON, with the study's files named from its ``folder``."""
@@ -48,7 +48,7 @@ class ComponentSpec:
         Raises
         ------
         PluginError
-            What it needs is not installed, or building fails.
+            A module that it needs is not installed, or building fails.
         """
         if missing := self.offer.missing:
             raise PluginError(f"{self.called or repr(self.name)} {missing}")
@@ -89,7 +89,7 @@ class ComponentResolver:
         return {name: choice for name, choice in chosen.items() if choice}
 
     def choose_others(self) -> dict[str, ComponentSpec]:
-        """Return what the protocol uses of roles that have no place in a study of their own."""
+        """Return the protocol's components of roles that have no field of their own in a study."""
         found: dict[str, ComponentSpec] = {}
         for role, entry in ROLES.items():
             for key in entry.keys:
@@ -216,7 +216,7 @@ class ComponentResolver:
         choices: Mapping[str, ComponentSpec],
         machine: Machine,
     ) -> dict[str, RoleT]:
-        """Return what a section of the protocol names, built, noting what cannot be as written."""
+        """Return the components that a section names, built; note those that cannot be built."""
         built: dict[str, RoleT] = {}
         for name, choice in choices.items():
             try:
@@ -241,7 +241,7 @@ class ComponentResolver:
 def _elsewhere(machine: object, folder: Path) -> tuple[Place, str] | None:
     """Return which file of a machine, or what it uses, is not in the study's folder, and why not.
 
-    What comes with labcrane lies where labcrane does.
+    Files that come with labcrane are in its own folder.
     """
     kinds: dict[Place, object] = {(): machine}
     if isinstance(machine, Mapping):

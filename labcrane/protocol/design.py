@@ -118,7 +118,7 @@ a list of names."""
 
 
 class Design(Settings):
-    """What is varied, and how."""
+    """The factors that are varied, and how."""
 
     groups: dict[FactorName, tuple[str, ...]] = Field(default_factory=dict)
     """Between-subject groups, and the feedback that each is given: ``{none: [], visual:

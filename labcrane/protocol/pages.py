@@ -21,7 +21,7 @@ PICTURES: Mapping[str, bytes] = {
     ".jpeg": b"\xff\xd8\xff",
     ".svg": b"<svg",
 }
-"""What is at the beginning of a picture, by its ending; of an SVG it is somewhere there."""
+"""Signature of a picture's format, by its file ending; in an SVG it may be anywhere."""
 
 MOST_LOGO = 2_000_000
 """Bytes: every tablet loads it."""

@@ -60,7 +60,7 @@ DEFAULT_OPERATOR = Use(use="simulated_operator")
 
 
 class Participants(Section):
-    """Who takes part."""
+    """The participants."""
 
     pattern: str = r"P\d{3,4}"
     """Regular expression that a participant's pseudonym matches as a whole."""
@@ -104,7 +104,7 @@ class _AsDescribed:
 
 
 class OnFault(Section):
-    """What happens when something fails during a session."""
+    """Reactions to faults during a session."""
 
     input_lost: Literal["pause", "end"] = "pause"
     """The operator's controls are unplugged or fall silent: pause until they are back, or end the
@@ -134,10 +134,10 @@ class Protocol(Section):
     """Short name of the study, in lower case; part of every seed."""
 
     title: str
-    """What the study is called."""
+    """Name of the study."""
 
     participants: Participants = Participants()
-    """Who takes part, and how many."""
+    """Number and pseudonyms of the participants."""
 
     rate_hz: PositiveFloat = Field(default=240.0, le=2000.0)
     """Ticks of the loop per second."""
@@ -147,19 +147,19 @@ class Protocol(Section):
     or MJCF file with its joints: ``{urdf: arm.urdf, joints: [...], tip: hook}``."""
 
     input: Use
-    """What the operator moves."""
+    """The device that the operator moves."""
 
     operator: Use = DEFAULT_OPERATOR
-    """Who moves it when the study is simulated."""
+    """The simulated operator, which moves the input in simulations."""
 
     scheme: Use
     """How the operator's axes become commands."""
 
     dynamics: Use
-    """What moves."""
+    """The simulated motion of the machine."""
 
     tasks: dict[FactorName, Use] = Field(min_length=1)
-    """What the operator is asked to do, by name."""
+    """Tasks of the operator, by name."""
 
     questionnaires: dict[str, Use] = Field(default_factory=dict)
     """Questionnaires with settings, by the study's names for them. One without settings is asked
@@ -175,7 +175,7 @@ class Protocol(Section):
     """Where the experimenter's and the participant's page are served."""
 
     feedback: dict[str, Use] = Field(default_factory=dict)
-    """What can be switched on during trials, by name: cues for every view, and sounds."""
+    """Feedback that can be switched on during trials, by name: cues for every view, and sounds."""
 
     views: dict[str, Use] = Field(default_factory=dict)
     """Windows and other displays that are always there, by name."""
@@ -196,13 +196,13 @@ class Protocol(Section):
     """How much of a movement the operator must have been shown."""
 
     design: Design = Design()
-    """What is varied between and within participants, and in which order."""
+    """Factors between and within participants, and their order."""
 
     sessions: tuple[Session, ...] = Field(min_length=1)
     """The visits, in order."""
 
     on_fault: OnFault = OnFault()
-    """What happens when something fails."""
+    """Reactions to faults."""
 
     environment: Literal["record", "refuse"] = "record"
     """What is installed is not what was when the study was approved (another NumPy): name it and

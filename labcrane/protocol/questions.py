@@ -423,7 +423,7 @@ def _of_feedback(study: Study) -> Doubts:
 
 
 SWITCHES = ("all", "none", "group")
-"""What ``feedback:`` of a step can say instead of names."""
+"""Values of ``feedback:`` of a step that are not names."""
 
 
 def _of_what_nobody_sees(study: Study) -> Doubts:
@@ -485,7 +485,7 @@ def _audiences(study: Study) -> Iterator[Sequence[str]]:
 
 
 def _of_what_is_shared(study: Study) -> Doubts:
-    """Question views that fill one screen, one over the other, and what writes to one port."""
+    """Question views that cover each other on one screen, and components that share a port."""
     first: dict[tuple[str, str], str] = {}
     for part, choice in study.choices.items():
         key, _, name = part.partition(".")

@@ -33,7 +33,7 @@ OWNERS: Mapping[str, str] = {
     "object": "the picture",
     "view": "the protocol",
 }
-"""Who has the names of a kind, for the message; any other kind is the study's."""
+"""Owners of the names of a kind, for messages; other kinds belong to the study."""
 
 READ_BY_BUILDING = frozenset({"input", "operator", "scheme", "dynamics"})
 """Keys of components that open the files of their settings when they are built: a check builds
@@ -45,14 +45,14 @@ BUILT = frozenset({"tasks", "questionnaires"})
 
 @dataclass(frozen=True)
 class Parts:
-    """What a protocol is made of, as far as it could be read.
+    """The parts of a protocol, as far as it could be read.
 
     Attributes
     ----------
     machine
         What is operated.
     components
-        What was chosen, by its place in the protocol.
+        The chosen components, by their place in the protocol.
     tasks
         The tasks that could be built.
     sections
@@ -82,7 +82,7 @@ class ReferenceChecker:
         self._noted: set[Place] = set()  # files of which something was said
 
     def check(self) -> None:
-        """Look up what every component's settings mention, and what they need unmentioned."""
+        """Look up the names in every component's settings, and those that they need implicitly."""
         self._check_sections()
         for place, choice in self._components.items():
             before = self._source.wrong
@@ -194,7 +194,7 @@ class ReferenceChecker:
         return self._names(mark.kind, at)
 
     def _of_holders(self, mention: Mentioned, kind: str, choice: ComponentSpec) -> Known:
-        """Return what a component has of a kind: as its innermost settings say."""
+        """Return a component's names of a kind, from its innermost settings."""
         for holder in reversed(mention.holders[1:]):
             if isinstance(holder, Settings) and kind in (said := holder.provides(self._machine)):
                 return frozenset(said[kind])
@@ -234,7 +234,7 @@ class ReferenceChecker:
         return None if said is None else frozenset(said)
 
     def _whole(self, at: Place, mention: Mentioned, choice: ComponentSpec) -> None:
-        """Note what a mapping leaves out or has twice."""
+        """Note keys that a mapping lacks or has twice."""
         mark, value = mention.mark, mention.value
         if isinstance(mark, Covers):
             own = self._of_holders(mention, mark.kind, choice) if mark.own else None
@@ -305,7 +305,7 @@ class ReferenceChecker:
         return found
 
     def _of(self, places: Sequence[Place], kind: str) -> Known:
-        """Return what the components at these places have; None unless all of them say."""
+        """Return the names of the components at these places; None unless all state them."""
         found: set[str] = set()
         for place in places:
             choice = self._components.get(place)
@@ -341,7 +341,7 @@ def _columns(component: Component) -> Iterator[str]:
 
 
 def _has(kind: str, name: str, known: frozenset[str]) -> str:
-    """Return what there is, and the nearest name."""
+    """Return the existing names, and the nearest one."""
     there = nearest(name, sorted(known), f"{OWNERS.get(kind, 'it')} has")
     return f"there is no such {kind}; {there}"
 

@@ -28,11 +28,11 @@ class Rig:
 
     @property
     def components(self) -> tuple[Component, ...]:
-        """What every trial begins with, the operator's controls last; its task comes after."""
+        """Components that begin every trial, the operator's controls last; the task comes after."""
         return (self.dynamics, self.controller, self.input)
 
     def metadata(self) -> dict[str, Value]:
-        """Return what the open components want to have recorded, by dotted name."""
+        """Return the values that the open components record, by dotted name."""
         parts = {"input": self.input, "scheme": self.controller, "dynamics": self.dynamics}
         return {
             f"{part}.{name}": value

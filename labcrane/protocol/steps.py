@@ -152,7 +152,7 @@ class Session(Section):
     ``90 min``. A check warns of a session that is likely to take longer."""
 
     steps: tuple[Step, ...] = Field(min_length=1)
-    """What happens, in order."""
+    """Steps of the session, in order."""
 
     @field_validator("after_days", mode="before")
     @classmethod
@@ -259,7 +259,7 @@ def _no_step(source: YamlFile, place: Place, step: Any) -> None:
 
 
 def _beside_track(block: Block) -> tuple[str, str] | None:
-    """Return what a block cannot have whose trials are not known beforehand, and why."""
+    """Return a key that a block with unpredictable trials cannot have, and why."""
     if block.until:
         return "until", "a block with a track ends by the track's own rule"
     if block.fading != (1.0,):

@@ -54,7 +54,7 @@ class StreamNeed(Settings):
     its times. What the stream's own header states holds by default."""
 
     space: Literal["screen", "scene"] | None = None
-    """What the pixels of a gaze stream are of: the participant's window (``screen``), or the scene
+    """Reference of the pixels of a gaze stream: the participant's window (``screen``), or the scene
     camera of a head-mounted tracker (``scene``), by which no area is looked at. What the stream's
     own header states holds by default; where it states nothing, no gaze is measured."""
 
@@ -87,7 +87,7 @@ class StreamNeed(Settings):
     def request(
         self, label: str, *, required: bool, expected: Sequence[str] = ()
     ) -> "StreamRequest":
-        """Return what the recorder is asked for; ``label`` is the study's name for it.
+        """Return the request to the recorder; ``label`` is the study's name for the stream.
 
         ``expected`` has the questions that a protocol has answered.
         """

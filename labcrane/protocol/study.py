@@ -48,7 +48,7 @@ class Study:
         What presents the session to people, by the protocol's names: cues and sounds are switched
         on block by block, views are always there.
     monitors
-        What looks at the signals of streams; None for all that are installed.
+        Monitors of the signals of streams; None for all that are installed.
     others
         Components of roles that have no place of their own here, by the part they play.
     call_monitor
@@ -164,7 +164,7 @@ OWN_STREAMS = tuple(
     f"labcrane.{name}"
     for name in ("state", "input", "markers", "labels", "codes", "frame", "context")
 )
-"""What every session sends (:mod:`labcrane.streams.outlets`)."""
+"""Streams that every session sends (:mod:`labcrane.streams.outlets`)."""
 
 MOST_TRIALS = 100_000
 """Of a block."""
@@ -275,7 +275,7 @@ class Checker:
                 self._source.problem(("design", "primary", number), message)
 
     def _track(self, place: Place, block: Block, task: Task) -> bool:
-        """Note what is wrong with a block's track, for its task; return whether all is right."""
+        """Note mistakes of a block's track, for its task; return whether there are none."""
         tracks = self._protocol.design.tracks
         track = tracks.get(block.track)
         if track is None:

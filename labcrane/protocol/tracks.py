@@ -212,7 +212,7 @@ class Track(Settings):
 
     @property
     def by(self) -> str:
-        """What chooses, as people call it."""
+        """Name of the procedure that chooses the levels."""
         if self.up_down is not None:
             up_down = self.up_down
             return (

@@ -35,7 +35,7 @@ class Annotation:
     Attributes
     ----------
     time
-        What it is at, or begins at, in seconds on the session's clock.
+        Its time, or its beginning, in seconds on the session's clock.
     until
         When it ends, in seconds on the same clock; the same as ``time`` for a moment.
     text

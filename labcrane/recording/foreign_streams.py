@@ -317,7 +317,7 @@ def _told_once(
 
 
 def both_clocks(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return what two recorders of one computer logged of its clock, in order, each once.
+    """Return the readings of one computer's clock by two recorders, in order, each once.
 
     Monotonic clocks restart with the computer: of two logs that do not agree, the longer is used.
     """

@@ -34,14 +34,14 @@ LOOP = (
     ),
     Signal("paused", "1", definition="1 while the session is paused, else 0"),
 )
-"""What the loop itself puts into every row."""
+"""Columns that the loop itself writes."""
 
 DUE = 1
 """Which of them says when a tick is due."""
 
 
 def columns(run: Run) -> tuple[Column, ...]:
-    """Return what a row holds, in order."""
+    """Return the columns of a row, in order."""
     layouts = {"input": run.axes, "command": run.command, "state": run.state, "task": run.task}
     return (
         *(Column("loop", each.name, each.unit) for each in LOOP),
@@ -59,7 +59,7 @@ def sizes(run: Run) -> tuple[int, int, int, int]:
 
 
 CHUNK_BYTES = 16
-"""What the journal adds to a frame, about."""
+"""Bytes that the journal adds to a frame, about."""
 
 
 def frame_bytes(run: Run) -> int:
@@ -184,7 +184,7 @@ class FrameLog:
         self._catch_up()
 
     def close(self) -> None:
-        """Write what waits, if the disk takes it now, and close the journal.
+        """Write the waiting data, if the disk takes them now, and close the journal.
 
         Raises
         ------
@@ -294,7 +294,7 @@ class BatchLog(FrameLog):
             self._flush()
 
     def close(self) -> None:
-        """Write what waits, and close the journal."""
+        """Write the waiting data, and close the journal."""
         try:
             self._flush()
         finally:

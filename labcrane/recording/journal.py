@@ -158,7 +158,7 @@ def event_text(event: Event, tick: int) -> str:
 
 
 def _plain(value: object) -> object:
-    """Return what json does not know as something it does."""
+    """Convert a value that json does not know."""
     if isinstance(value, np.generic):
         return finite(value.item())
     if isinstance(value, np.ndarray):

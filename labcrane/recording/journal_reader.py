@@ -61,7 +61,7 @@ class JournalState:
 
     @property
     def notes(self) -> list[str]:
-        """What was not as it should be, for people."""
+        """Damage of the journal, for people."""
         notes = []
         if self.damaged:
             notes.append(f"{self.name}: {self.damaged} bytes are damaged and were left out")

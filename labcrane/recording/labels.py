@@ -27,7 +27,7 @@ Attempt = tuple[object, object]
 
 
 class Meaning(NamedTuple):
-    """What an event is.
+    """Description of a kind of event.
 
     Attributes
     ----------

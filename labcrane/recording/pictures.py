@@ -5,7 +5,7 @@ afterwards. Both use this one number, so that they agree.
 """
 
 LOG = "labcrane.feedback."
-"""What the names of streams begin with in which views and sounds say what they presented."""
+"""Prefix of the streams in which views and sounds log what they presented."""
 
 RATE_S = 1.0
 """The rate of pictures is how many were shown in so many seconds. Over the whole of a movement a

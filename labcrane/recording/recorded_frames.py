@@ -62,5 +62,5 @@ class RecordedFrames:
         return frame
 
     def events(self, first: int, last: int) -> list[Event]:
-        """Return what happened after the frame in row ``first``, up to that in row ``last``."""
+        """Return the events after the frame in row ``first``, up to that in row ``last``."""
         return self._events[bisect_right(self._told, first) : bisect_right(self._told, last)]

@@ -16,7 +16,7 @@ from labcrane.types import FloatArray
 
 @dataclass(frozen=True)
 class RunScene:
-    """What does not change in a session's context."""
+    """The constant part of a session's context."""
 
     rate_hz: float
     seed: int
@@ -32,7 +32,7 @@ def _codec() -> TypeAdapter[RunScene]:
 
 
 def write_run(run: Run) -> str:
-    """Return what does not change in a session's context, as JSON."""
+    """Return the constant part of a session's context, as JSON."""
     layouts = {"axes": run.axes, "command": run.command, "state": run.state, "task": run.task}
     scene = RunScene(
         run.rate_hz, run.participant_seed, run.machine, layouts, run.bodies, run.places

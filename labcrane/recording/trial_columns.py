@@ -61,7 +61,7 @@ def trial_units(task: Task) -> dict[str, str]:
 
 
 def trial_definitions(task: Task) -> dict[str, str]:
-    """Return what is in each column of the session and of ``task``."""
+    """Return the definition of each column of the session and of ``task``."""
     return {
         column: signal.definition
         for signal in (*OWN, *task.conditions, *task.results)

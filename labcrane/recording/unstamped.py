@@ -25,7 +25,7 @@ TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """What a recorder has of a stream.
+    """A recorder's data of a stream.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Received:
     texts: Texts
 
     def rows(self, begin: int, end: int) -> list[bytes] | Texts:
-        """Return what some samples say, to be compared to the bit."""
+        """Return the values of some samples, to be compared to the bit."""
         if self.texts:
             return self.texts[begin:end]
         return [np.ascontiguousarray(row).tobytes() for row in self.data[begin:end]]
@@ -105,7 +105,7 @@ def stamped(
 
 
 def _told_by(mine: Received, begin: int, end: int, other: Received) -> FloatArray | None:
-    """Return what another recorder stamped the same samples with, before the same next one."""
+    """Return another recorder's timestamps of the same samples, before the same next one."""
     rows = mine.rows(begin, end + 1)
     for at in np.flatnonzero(other.stamps == mine.stamps[end]).tolist():
         first = at - (end - begin)

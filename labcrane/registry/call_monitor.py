@@ -62,7 +62,7 @@ class Overrun:
 
 
 class CallMonitor:
-    """What is known of all components of one study.
+    """State of all components of one study.
 
     Attributes
     ----------
@@ -216,7 +216,7 @@ class CallMonitor:
         return PluginError(self.complaint(number, f"raised {told(error, _module(function))}"))
 
     def complaint(self, number: int, what: str) -> str:
-        """Return what a method did wrong, with all that is known of it."""
+        """Return the error of a method, with its component, plugin and place."""
         when = f" in tick {self.tick}" if self.tick >= 0 else ""
         return f"{self._places[number - 1]}, {what}{when}"
 

@@ -11,7 +11,7 @@ from labcrane.registry.offers import CommandOffer
 def plugin_commands(
     plugins: Iterable[EntryPoint] | None = None,
 ) -> Mapping[tuple[str, str], CommandOffer]:
-    """Return what plugins offer, by the words that the user types.
+    """Return the commands of plugins, by the words that the user types.
 
     A plugin that cannot be imported offers nothing: ``labcrane plugins`` says why.
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from importlib.metadata import Distribution
 
 INFORMATION = (".dist-info", ".egg-info")
-"""What folders with a distribution's metadata end in."""
+"""Endings of folders with a distribution's metadata."""
 
 LISTED = "entry_points.txt"
 """File of a distribution's entry points, in sections named by group."""
@@ -96,7 +96,7 @@ def _all(path: tuple[str, ...]) -> tuple[tuple[str, EntryPoint], ...]:
 
 
 def _name(found: "Distribution") -> str:
-    """Return what a distribution is called; nothing for what an installer left behind."""
+    """Return a distribution's name; empty for remains of an installer."""
     try:
         return found.metadata["Name"] or ""
     except FileNotFoundError:  # as later libraries say it

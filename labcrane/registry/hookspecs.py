@@ -106,7 +106,7 @@ def labcrane_commands() -> Sequence[CommandOffer]:
 
 
 class Returned(Enum):
-    """What a method that runs every tick must return."""
+    """The value that a method that runs every tick must return."""
 
     NUMBERS = auto()
     """An array of what the component's signals promise, all of them numbers."""
@@ -124,7 +124,7 @@ class RoleEntry:
     hook
         The hook that collects its offers.
     word
-        What a researcher calls it.
+        Its name for researchers.
     about
         What a plugin of it is, in words.
     keys

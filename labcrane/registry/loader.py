@@ -45,7 +45,7 @@ class PluginModules:
     manager
         Knows the hooks of those that were imported.
     broken
-        What is wrong with a plugin, by its name.
+        Mistakes of a plugin, by its name.
     local
         The files of the study's own plugins, by name: ``plugins/arrow.py``.
     names
@@ -98,7 +98,7 @@ class PluginModules:
 
 
 class _Waiting(NamedTuple):
-    """A plugin that is not imported yet, and what it says that it offers, if it says so."""
+    """A plugin that is not imported yet, with the offers that it declares, if any."""
 
     plugin: str
     load: Callable[[], ModuleType]
@@ -109,7 +109,7 @@ class _Waiting(NamedTuple):
 
 
 def offered(implementation: pluggy.HookImpl, kind: type[OfferT], made_by: str) -> list[OfferT]:
-    """Return what one plugin's hook offers; ``made_by`` is how a plugin makes such an offer.
+    """Return the offers of one plugin's hook; ``made_by`` is how a plugin makes such an offer.
 
     Raises
     ------

@@ -84,7 +84,7 @@ class _Proxy(Component):
             vars(self)["read"] = _beginning(self._call_monitor, vars(self)["read"])
 
     def _check(self, method: str) -> Callable[[Any], None] | None:
-        """Return what looks at what a method returned."""
+        """Return the check of a method's results."""
         match self._returns.get(method):
             case Returned.NUMBERS:
                 return self._numbers(self._number[method])

@@ -17,7 +17,7 @@ RoleT = TypeVar("RoleT", bound=Component)
 
 
 class Registry:
-    """What is on offer, and why what should be is not.
+    """The offers of all plugins, and the reasons of missing ones.
 
     A plugin that says in its entry points what it offers is imported when that is looked for; all
     are when everything is listed, or when there is not what is looked for.
@@ -49,7 +49,7 @@ class Registry:
 
     @property
     def broken(self) -> Mapping[str, str]:
-        """What is wrong with a plugin that offers nothing, or not all it should, by plugin."""
+        """Mistakes of plugins that offer nothing, or not all they should, by plugin."""
         self._import()
         return self._modules.broken
 
@@ -113,7 +113,7 @@ class Registry:
 
 
 def discover(plugins: Iterable[EntryPoint] | None = None, *, study: Path | None = None) -> Registry:
-    """Return what the plugins in the ``labcrane`` entry-point group offer.
+    """Return the offers of the plugins in the ``labcrane`` entry-point group.
 
     A plugin that cannot be imported is noted, not raised: a missing audio library must not
     stop a study that makes no sound.

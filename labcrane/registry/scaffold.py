@@ -18,7 +18,7 @@ ANY, BARE = "any", "bare"
 """The folders of what every plugin needs, beside one for each role, and of a role without one."""
 
 COMMAND = "command"
-"""What else a plugin can be made of: it fills no role."""
+"""Another kind of plugin, which fills no role."""
 
 GROUP = """
 # And this one names the group of its commands, which `labcrane --help` lists.
@@ -28,7 +28,7 @@ my_part = "my_module"
 
 
 def kinds() -> dict[str, str]:
-    """Return what a plugin can be, and that in words: every role, and commands."""
+    """Return the kinds of plugins with their descriptions: every role, and commands."""
     roles = {entry.word: entry.about for entry in ROLES.values()}
     return {**roles, COMMAND: "a command of the command line"}
 

@@ -34,7 +34,7 @@ def place(error: BaseException, module: Path | None = None) -> str:
 
 
 def told(error: BaseException, module: Path | None = None) -> str:
-    """Return what kind of error it is, what it says, and where it arose."""
+    """Return the type of an error, its message, and its origin."""
     said = f"{type(error).__name__}: {error}".removesuffix(": ")
     where = place(error, module)
     return f"{said} ({where})" if where and not isinstance(error, SyntaxError) else said
@@ -48,5 +48,5 @@ def _steps(error: BaseException) -> Iterator[tuple[Path, int]]:
 
 
 def _home(module: Path) -> Path:
-    """Return what belongs to the plugin: a package's folder, or the file alone."""
+    """Return the files of the plugin: a package's folder, or the file alone."""
     return module.parent if (module.parent / "__init__.py").exists() else module

@@ -59,7 +59,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Replayed:
-    """What came of a replay.
+    """Result of a replay.
 
     Attributes
     ----------
@@ -176,7 +176,7 @@ class _Log(FrameLog):
 
     @property
     def trouble(self) -> str | None:  # type: ignore[override]  # recorded, not found out
-        """What was wrong with the disk in this tick."""
+        """The disk's fault in this tick."""
         return self._script.disk_trouble
 
     def write(self, frame: Frame) -> None:

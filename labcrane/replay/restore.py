@@ -22,7 +22,7 @@ MOVING = ("scheme", "dynamics", "tasks.")
 """The parts that a replay runs again."""
 
 OWN = re.compile(r"plugins/[^./\\:\0][^/\\:\0]*\.py")
-"""What a plugin of a study's own is called in a recording."""
+"""Name of a study's own plugin in a recording."""
 
 
 def restored_study(
@@ -48,7 +48,7 @@ def restored_study(
     ProtocolError
         The protocol cannot be run with what is installed.
     RecordingError
-        What is recorded of it is not as labcrane writes it.
+        Its record is not in the form that labcrane writes.
     """
     path = restore(record, folder, protocol, machine, run_code=run_code)
     code = own_code(record) if protocol is None else {}
@@ -210,7 +210,7 @@ def _installed(name: str) -> str:
 
 
 def _compared(name: str, then: object, now: object) -> Iterator[str]:
-    """Yield what differs in nested settings, by dotted path."""
+    """Yield the differences of nested settings, by dotted path."""
     if isinstance(then, Mapping) and isinstance(now, Mapping):
         for key in dict.fromkeys([*then, *now]):
             yield from _compared(f"{name}.{key}", then.get(key), now.get(key))

@@ -30,7 +30,7 @@ CameraWords = str | Mapping[str, Any]
 """A camera's name, or one that is written out as in a protocol."""
 
 BARE: Mapping[str, Any] = {"display": "hidden", "hud": (), "notices": False, "areas": ()}
-"""What a view is asked for, so that nothing is in its pictures but what a camera sees."""
+"""Settings of a view whose pictures show only what a camera sees."""
 
 
 class _Draws(Protocol):

@@ -78,7 +78,7 @@ class Script:
             self._take(int(tick), str(name), data)
 
     def _take(self, tick: int, name: str, data: Mapping[str, Any]) -> None:
-        """Note what an event says came from outside."""
+        """Note the outside inputs that an event reports."""
         part, _, what = name.rpartition(".")
         if part == "order":
             self._order(

@@ -23,7 +23,7 @@ EXTRA = "labcrane[fast]"
 
 @dataclass(frozen=True, slots=True)
 class SimulatedBy:
-    """By what a participant was simulated.
+    """How a participant was simulated.
 
     Attributes
     ----------

@@ -18,7 +18,7 @@ OF_AIMING = {"distance", "far_side", "difficulty"}
 
 
 def foreseen_tests(study: Study) -> pd.DataFrame:
-    """Return what the report will test each outcome over, as its table ``anova`` has it.
+    """Return the factors over which the report will test each outcome, as in its table ``anova``.
 
     Each planned participant has each planned trial, with times drawn at random, so that what can be
     tested, and told apart, follows from the plan alone. Empty where no trial is an aimed movement.

@@ -32,7 +32,7 @@ class Lognormal(Section):
     """Positive, with a long tail: most differences between people are of this kind."""
 
     median: PositiveFloat
-    """What half of the participants are below."""
+    """The median: half of the participants are below it."""
 
     log_sd: NonNegativeFloat
     """Standard deviation of the logarithm."""
@@ -155,7 +155,7 @@ class Population(Section):
         return replace(study, operator=replace(choice, settings=checked), answers=answers)
 
     def answered(self, study: Study, participant: str) -> dict[str, dict[str, Value]]:
-        """Return what a participant answers, by questionnaire and item."""
+        """Return a participant's answers, by questionnaire and item."""
         found: dict[str, dict[str, Value]] = {}
         for name, spreads in self.answers.items():
             items = {item.name: item for item in study.questionnaires[name].items()}
@@ -335,7 +335,7 @@ def _check_names(
 
 
 def _numbers(study: Study) -> dict[str, float]:
-    """Return what the study's operator is set by, of what is a number."""
+    """Return the numeric settings of the study's operator."""
     written = study.operator.settings.model_dump()
     return {name: value for name, value in written.items() if type(value) in (int, float)}
 

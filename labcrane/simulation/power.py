@@ -30,7 +30,7 @@ _BLANKS = re.compile(r"\s*([~=,:()\[\]])\s*")
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What a planned test is about: ``movement_time~sequence``, ``error~group[none,visual]=0.2``.
+    """Subject of a planned test: ``movement_time~sequence``, ``error~group[none,visual]=0.2``.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ def read_effect(text: str) -> Effect:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """What a planned test is to show.
+    """Claim that a planned test is to show.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class Tested:
 
 @dataclass(frozen=True, slots=True)
 class Pool:
-    """What a test needs of every participant.
+    """Data that a test needs from every participant.
 
     Attributes
     ----------
@@ -391,7 +391,7 @@ def power(
 
 @dataclass(frozen=True, slots=True)
 class Outcomes:
-    """What tests of cohorts say; shapes ``(cohorts,)``.
+    """Results of tests of cohorts; shapes ``(cohorts,)``.
 
     Attributes
     ----------

@@ -43,7 +43,7 @@ PATIENCE = 5.0
 """The same, as a multiple of what is expected."""
 
 BREAK_S = 0.1
-"""What is left of a break."""
+"""Length of a break in a rehearsal, in seconds."""
 
 HELD = 0.5
 """Share of a tick's time that may go by in what a rehearsal computes: a session also waits for
@@ -61,7 +61,7 @@ DRAWN = 200
 
 @dataclass(frozen=True, slots=True)
 class Rehearsed:
-    """What a rehearsal did.
+    """Summary of a rehearsal.
 
     Attributes
     ----------
@@ -241,7 +241,7 @@ def _one_of_each_group(study: Study) -> Iterator[tuple[str, int]]:
 
 
 def _shortened(steps: Sequence[PlannedStep]) -> Iterator[PlannedStep]:
-    """Yield what is left of a session: a trial of each block, the first of its repetitions."""
+    """Yield the rehearsed part of a session: a trial of each block, in its first repetition."""
     seen: set[tuple[object, ...]] = set()
     for step in steps:
         if step.block is None:

@@ -51,7 +51,7 @@ NAMES: Mapping[Kind, str] = {
     "anova": "analysis of variance", "contrast": "contrast, corrected after Holm",
     "trend": "linear trend", "mixed": "mixed model",
 }  # fmt: skip
-"""What the tests are called."""
+"""Names of the tests."""
 
 _OF_GROUP = re.compile(rf"{GROUP}\[T\.[^\]]+\]")
 
@@ -74,7 +74,7 @@ class PlannedTest:
     results
         Movements that are results, with the report's factors.
     factors
-        What varies in the study.
+        Factors of the study.
     people
         All participants who may be sampled, and their group, including dropouts without a result.
     """
@@ -294,7 +294,7 @@ def _mixed(planned: PlannedTest, results: "pd.DataFrame") -> ReportedTest:
 ASKED: Mapping[Kind, Callable[[PlannedTest, "pd.DataFrame"], ReportedTest]] = {
     "anova": _anova, "contrast": _contrast, "trend": _trend, "mixed": _mixed,
 }  # fmt: skip
-"""What each kind of test is asked by."""
+"""Functions of each kind of test."""
 
 
 class Drawer:

@@ -123,7 +123,7 @@ def paragraph(
     Parameters
     ----------
     test
-        What the test is called; nothing for a t test of participants' means.
+        Name of the test; empty for a t test of participants' means.
     recorded
         Whether the participants who are drawn were recorded, and not simulated.
     """

@@ -297,7 +297,7 @@ def _too_short(study: Study, participant: str) -> str:
 
 
 def _check_same(order: SimulationJob, study: Study) -> None:
-    """Note what is simulated here; refuse to mix it with something else."""
+    """Note the simulation in this folder; refuse to mix it with another."""
     cohort = order.cohort.read_text(encoding="utf-8") if order.cohort else None
     about = {
         "status": "SIMULATED",

@@ -45,7 +45,7 @@ def coupled(name: str, others: str, what: str) -> ChainError:
     others
         The joints that it moves with; empty where it is held.
     what
-        What of the file says so.
+        The entry in the file that says so.
     """
     how = f"moves with {others}" if others else "is held"
     return ChainError(
@@ -57,7 +57,7 @@ def coupled(name: str, others: str, what: str) -> ChainError:
 
 @dataclass(frozen=True)
 class Mass:
-    """What moves with one joint and no further one.
+    """The parts that move with one joint and no further one.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Axis:
     carries
         What moves with it.
     look
-        What its link looks like; None for a beam.
+        The mesh of its link; None for a beam.
     """
 
     name: str

@@ -33,7 +33,7 @@ class MachineDescription(StrictModel):
     """Link (URDF), site or body (MJCF) whose origin is the tip."""
 
     title: str = ""
-    """What the machine is called; the file's name for it by default."""
+    """Name of the machine; the name in the file by default."""
 
     rest_deg: dict[str, float] = Field(default_factory=dict)
     """Joint angles at which a session begins, in degrees, by the study's names; 0 by default."""
@@ -84,7 +84,7 @@ class MachineDescription(StrictModel):
         return self.urdf or self.mjcf or ""
 
     def read(self, folder: Path) -> tuple[Machine, str]:
-        """Return the machine, and what its own YAML would be.
+        """Return the machine, and its own YAML.
 
         Raises
         ------

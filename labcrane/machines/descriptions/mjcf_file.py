@@ -18,7 +18,7 @@ from labcrane.types import FloatArray
 
 
 class MjcfFile:
-    """What an MJCF file says.
+    """Content of an MJCF file.
 
     Parameters
     ----------

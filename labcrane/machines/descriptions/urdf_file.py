@@ -34,7 +34,7 @@ WHOLE_TURN = (-math.pi, math.pi)
 
 
 class UrdfFile:
-    """What a URDF file says.
+    """Content of a URDF file.
 
     Parameters
     ----------

@@ -151,7 +151,7 @@ def read_gltf(data: bytes, folder: Path, inside: bytes = b"") -> list[Surface]:
 
 
 class _File:
-    """What a glTF file holds, by number."""
+    """Content of a glTF file, by number."""
 
     def __init__(self, tree: _Tree, folder: Path, inside: bytes) -> None:
         self._tree = tree

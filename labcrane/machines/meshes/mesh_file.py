@@ -29,7 +29,7 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
 
 
 class MeshFile(StrictModel):
-    """What something looks like; what it touches is not changed by it."""
+    """Visual geometry; it does not change the collision geometry."""
 
     file: Annotated[Path, AfterValidator(_beside)]
     """STL, OBJ or glTF; its axes are taken as they are in the file."""

@@ -10,7 +10,7 @@ HEAD = 84
 """Bytes before the first triangle: a title of 80, and how many there are."""
 ROW = np.dtype([("normal", "<f4", 3), ("points", "<f4", (3, 3)), ("attribute", "<u2")])
 FACET = ("facet", "outer", "vertex", "vertex", "vertex", "endloop", "endfacet")
-"""What the lines of a triangle begin with."""
+"""First words of the lines of a triangle."""
 NUMBERS = {"facet": ("normal", 5), "vertex": ("", 4), "outer": ("loop", 2)}
 """The second word of a line, and how many words it has."""
 

@@ -57,7 +57,7 @@ def citation(version: str = "") -> str:
 
 
 def write_about(file: "h5py.File", context: Mapping[str, Any]) -> None:
-    """Write what a participant file is into it, once its sessions are there."""
+    """Write the description of a participant file into it, once it contains its sessions."""
     title, study = str(context.get("title", "")), str(context.get("study", ""))
     version = str(context.get("versions", {}).get("labcrane", ""))
     write_text(file, README, TEXT.format(title=title or study, study=study))

@@ -27,7 +27,7 @@ MOST_CHUNK_BYTES = 1 << 26
 writes none beyond a sixty-fourth of it."""
 
 SMALL_BYTES = 1 << 16
-"""What a column may hold beyond that: one without chunks of its own has no packed size."""
+"""Bytes that a column may have beyond that: one without chunks of its own has no packed size."""
 
 HEAP = b"GCOL\x01\0\0\0"
 """Where a heap of texts begins."""

@@ -73,7 +73,7 @@ class Stream:
 
     @cached_property
     def time_basis(self) -> npt.NDArray[np.str_]:
-        """What each time rests on, shape ``(n,)``.
+        """Basis of each time, shape ``(n,)``.
 
         ``own`` for the session's own clock, ``probes`` of another one, ``arrivals`` where it was
         never probed, ``nothing`` where neither is known, ``unknown`` in files of before.

@@ -64,7 +64,7 @@ def _corrected(name: str) -> bool:
 
 
 def read_stream(group: "h5py.Group") -> RecordedStream:
-    """Return what a participant file holds of a stream, as far as its clock needs it.
+    """Return the data of a stream in a participant file that correcting its clock needs.
 
     The samples' values are left out: texts are empty, and data have no channels;
     :func:`read_channel` reads one.
@@ -94,7 +94,7 @@ def read_stream(group: "h5py.Group") -> RecordedStream:
 
 
 def _own_clock(group: "h5py.Group") -> FloatArray:
-    """Return what the session's recorder logged of its own clock; files of before have nothing."""
+    """Return the recorder's log of its own clock; older files have none."""
     session = group.parent.parent
     if "own_clock" not in session:
         return np.empty((0, len(OWN_CLOCK_CHANNELS)))

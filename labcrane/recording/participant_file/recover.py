@@ -18,7 +18,7 @@ from labcrane.recording.paths import journal_path, participant_path, parts, sess
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """What became of one session's journals.
+    """Result of recovering one session's journals.
 
     Attributes
     ----------

@@ -41,7 +41,7 @@ def write_session(group: "h5py.Group", log: SessionLog, journals: Sequence[Journ
 
 
 def write_tables(group: "h5py.Group", log: SessionLog, journals: Sequence[JournalState]) -> None:
-    """Write what follows from a session's events: its context, trials and answers."""
+    """Write the context, trials and answers, which follow from a session's events."""
     context = log.context
     write_attributes(group, attributes(context))
     write_text(group, "protocol", str(context.get("protocol", "")))
@@ -52,7 +52,7 @@ def write_tables(group: "h5py.Group", log: SessionLog, journals: Sequence[Journa
 
 
 def attributes(context: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what of the context becomes an attribute: everything plain, but the long texts."""
+    """Return the attributes from the context: all plain values except long texts."""
     return {
         name: value
         for name, value in context.items()

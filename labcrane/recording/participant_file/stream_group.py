@@ -46,7 +46,7 @@ def write_streams(group: "h5py.Group", streams: Sequence[RecordedStream]) -> Non
 
 
 def write_own_clock(group: "h5py.Group", streams: Sequence[RecordedStream]) -> None:
-    """Write what the session's recorders logged of their own clock."""
+    """Write the log that the session's recorders kept of their own clock."""
     if not streams:
         return
     clocks = reduce(both_clocks, (stream.own_clock for stream in streams))

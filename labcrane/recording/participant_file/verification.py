@@ -55,7 +55,7 @@ def unlike_journals(
     streams: Sequence[RecordedStream],
     journals: Sequence[JournalState],
 ) -> Iterator[str]:
-    """Yield what a session's group does not hold as its journals do."""
+    """Yield the differences of a session's group from its journals."""
     yield from _unlike_frames(group, log)
     for name, values, marks in _columns(group, log, streams):
         if name not in group or not _marked(group[name], marks):
@@ -73,7 +73,7 @@ def unlike_journals(
 def _columns(
     group: "h5py.Group", log: SessionLog, streams: Sequence[RecordedStream]
 ) -> Iterator[tuple[str, Any, Mapping[str, Any]]]:
-    """Yield what there has to be: name, values and attributes."""
+    """Yield the expected items: name, values and attributes."""
     yield "time", log.time, {"unit": "s"}
     yield "part", log.part, {"unit": "1"}
     for number, column in enumerate(log.columns):
@@ -156,7 +156,7 @@ def _unlike_tables(
     streams: Sequence[RecordedStream],
     journals: Sequence[JournalState],
 ) -> Iterator[str]:
-    """Write what is small once more, in memory, and compare the two."""
+    """Write the small items again, in memory, and compare the two."""
     import h5py  # noqa: PLC0415
 
     with h5py.File("again", "w", driver="core", backing_store=False) as again:

@@ -47,12 +47,12 @@ Conclude = Callable[["h5py.Group"], object]
 DAMAGED = (
     OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError,
 )  # fmt: skip
-"""What reading a damaged file raises somewhere below."""
+"""Exceptions that reading a damaged file may raise."""
 
 
 @dataclass(frozen=True, slots=True)
 class Consolidated:
-    """What was put into a participant file.
+    """Summary of a session that was put into a participant file.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Consolidated:
     streams
         Samples per external stream.
     notes
-        What was not as it should be in the journals, for people.
+        Damage of the journals, for people.
     """
 
     path: Path

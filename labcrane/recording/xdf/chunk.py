@@ -19,7 +19,7 @@ BOUNDARY = bytes.fromhex("43a546dccbf5410fb30ed5467383cbe4")
 
 
 class Tag(IntEnum):
-    """What a chunk holds."""
+    """Content of a chunk."""
 
     FILE_HEADER = 1
     STREAM_HEADER = 2

@@ -79,7 +79,7 @@ class XdfStream:
 
 @dataclass
 class XdfFile:
-    """What could be read from a file, and what could not.
+    """The content of a file, as far as it could be read.
 
     Attributes
     ----------

@@ -42,7 +42,7 @@ _STAMP = struct.Struct("<Bd")
 
 @dataclass
 class _Written:
-    """What the footer of a stream says."""
+    """Content of a stream's footer."""
 
     header: StreamHeader
     head: bytes

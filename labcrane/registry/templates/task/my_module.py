@@ -39,7 +39,7 @@ class MyPart(Task):
         self._settings = settings
 
     def factors(self) -> Mapping[str, Sequence[str]]:
-        """Return what a protocol may order: design: {order: {heights: shuffled}}."""
+        """Return the factors that a protocol may order: design: {order: {heights: shuffled}}."""
         return {"heights": [f"{height:g}" for height in self._settings.heights]}
 
     def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[PlannedTrial]:
