@@ -37,8 +37,8 @@ class Mentions:
     def of(self, text: str, start: int = 0, stop: int | None = None) -> set[str]:
         """Return whose pseudonyms begin in ``text`` between two of its places.
 
-        The text around a word decides whether it is a name, so that of a longer text that is
-        read in pieces each piece has something before and behind it.
+        The text around a word decides whether it is a name. A longer text is therefore
+        read in chunks, each with some text before and after it.
         """
         # What begins with a look behind is tried at every sign, and files have many millions; the
         # letters alone are searched for as fast as memory is read.

@@ -43,17 +43,17 @@ MOST_COUNTED = 200_000
 
 
 class LevelOrder(Settings):
-    """In which order the levels of a factor come."""
+    """Order of the levels of a factor."""
 
     rule: str
     """``as_written``; ``shuffled``: all repetitions together; ``blocked``: each repetition by
     itself; ``latin_square`` or ``williams``: each participant has a row of the square."""
 
     times: Annotated[PositiveInt, AtMost(1000)] = 1
-    """How often each level comes in a block."""
+    """How often each level occurs in a block."""
 
     in_a_row: Annotated[PositiveInt | None, Usual(1, 50)] = None
-    """How often a level may come in a row, where the order is random."""
+    """How often a level may occur in a row, where the order is random."""
 
     @field_validator("rule")
     @classmethod
@@ -121,8 +121,8 @@ class Design(Settings):
     """The factors that are varied, and how."""
 
     groups: dict[FactorName, tuple[str, ...]] = Field(default_factory=dict)
-    """Between-subject groups, and the feedback that each is given: ``{none: [], visual:
-    [sphere]}``. Participants are spread over them equally."""
+    """Between-subject groups, and the feedback of each: ``{none: [], visual:
+    [sphere]}``. Participants are assigned to them in equal numbers."""
 
     conditions: dict[FactorName, Switch] = Field(default_factory=dict)
     """Conditions within participants, and the feedback that is on in each: ``{plain: none, tone:
@@ -135,11 +135,11 @@ class Design(Settings):
     written. ``condition`` is the order of the conditions."""
 
     tracks: dict[str, Track] = Field(default_factory=dict)
-    """Levels that are chosen while the session runs, by what the participant does: staircases and
+    """Levels that are chosen during the session, from the participant's results: staircases and
     QUEST+. Blocks name them as ``track``."""
 
     primary: tuple[str, ...] = ()
-    """The primary outcomes, by which the study is judged: results of its tasks or measures of a
+    """Primary outcomes of the study: results of its tasks or measures of a
     movement, ``[circle_to_circle, absolute_error]``. Their trends share one correction for several
     tests; where none are named, all outcomes that the report tests share it."""
 
@@ -182,10 +182,10 @@ class Design(Settings):
 
 
 class Criterion(Settings):
-    """When practice is enough."""
+    """End of practice."""
 
     successes: PositiveInt
-    """How many counted trials in a row must succeed."""
+    """Number of counted trials in a row that must succeed."""
 
     rounds: Annotated[PositiveInt, AtMost(1000)] = 1
-    """How many times the block is run at most; whether it was enough is recorded."""
+    """Most repetitions of the block; the record states whether the criterion was met."""

@@ -72,14 +72,14 @@ class PageSettings(Settings):
     """The certificate's private key in PEM, without a passphrase."""
 
     language: Language = "en"
-    """In which the participant's page speaks; questionnaires have languages of their own."""
+    """Language of the participant's page; questionnaires have languages of their own."""
 
     one_at_a_time: bool = False
-    """Whether the participant's page shows one question a screen instead of all."""
+    """Whether the participant's page shows one item per screen instead of all."""
 
     colour: str = Field(default="#0d47a1", pattern=r"^#[0-9a-fA-F]{6}$")
-    """The study's colour on the participant's page, as ``#rrggbb``: dark enough for white words to
-    be read on it (4.5 to 1)."""
+    """The study's colour on the participant's page, as ``#rrggbb``: dark enough for white text on
+    it (contrast 4.5 to 1)."""
 
     logo: StudyPath | None = None
     """The study's logo on the participant's page, PNG, JPEG or SVG; a path counts from the

@@ -63,10 +63,10 @@ class Participants(Section):
     """The participants."""
 
     pattern: str = r"P\d{3,4}"
-    """Regular expression that a participant's pseudonym matches as a whole."""
+    """Regular expression that must match a participant's whole pseudonym."""
 
     planned: Annotated[PositiveInt, AtMost(100_000)] = 1
-    """How many participants are planned."""
+    """Number of planned participants."""
 
     @field_validator("pattern")
     @classmethod
@@ -111,11 +111,11 @@ class OnFault(Section):
     session. The machine is held at rest either way."""
 
     stream_lost: Literal["pause", "mark"] = "pause"
-    """A required stream falls silent, or its recorder fails: pause until it is back, or go on and
-    mark it in the record."""
+    """A required stream falls silent, or its recorder fails: pause until it is back, or
+    continue and mark it in the record."""
 
     feedback_lost: Literal["restart", "continue", "pause"] = "restart"
-    """A view or sound fails: start it again, go on without it, or pause until it is back. One that
+    """A view or sound fails: restart it, continue without it, or pause until it is back. One that
     cannot be started in the first place stops the session, unless it is to go on without."""
 
     session_died: Literal["continue", "redo_trial", "redo_block"] = "redo_trial"
@@ -143,8 +143,8 @@ class Protocol(Section):
     """Ticks of the loop per second."""
 
     machine: Annotated[str | dict[str, Any], _AsDescribed()]
-    """Name of a machine that comes with labcrane, or of a YAML file in its folder; or a URDF
-    or MJCF file with its joints: ``{urdf: arm.urdf, joints: [...], tip: hook}``."""
+    """Name of a machine that comes with labcrane, or of a YAML file in the protocol's folder; or a
+    URDF or MJCF file with its joints: ``{urdf: arm.urdf, joints: [...], tip: hook}``."""
 
     input: Use
     """The device that the operator moves."""
@@ -153,7 +153,7 @@ class Protocol(Section):
     """The simulated operator, which moves the input in simulations."""
 
     scheme: Use
-    """How the operator's axes become commands."""
+    """Maps the operator's axes to commands."""
 
     dynamics: Use
     """The simulated motion of the machine."""
@@ -166,7 +166,7 @@ class Protocol(Section):
     by its own name and need not be listed."""
 
     indicator: IndicatorSettings = IndicatorSettings()
-    """How the performance indicator is worked out."""
+    """How the performance indicator is computed."""
 
     stop_rules: tuple[StopRule, ...] = ()
     """Scores above which the session pauses and the experimenter decides."""
@@ -178,12 +178,12 @@ class Protocol(Section):
     """Feedback that can be switched on during trials, by name: cues for every view, and sounds."""
 
     views: dict[str, Use] = Field(default_factory=dict)
-    """Windows and other displays that are always there, by name."""
+    """Windows and other displays that are always shown, by name."""
 
     streams: dict[Annotated[str, AfterValidator(_names_a_folder)], StreamNeed] = Field(
         default_factory=dict
     )
-    """Streams of others to be recorded, by the study's names for them."""
+    """External streams to be recorded, by the study's names for them."""
 
     monitors: dict[str, Use] | None = None
     """Monitors of the signals of those streams, by name. Without this key all that
@@ -199,13 +199,13 @@ class Protocol(Section):
     """Factors between and within participants, and their order."""
 
     sessions: tuple[Session, ...] = Field(min_length=1)
-    """The visits, in order."""
+    """The sessions (visits), in order."""
 
     on_fault: OnFault = OnFault()
     """Reactions to faults."""
 
     environment: Literal["record", "refuse"] = "record"
-    """What is installed is not what was when the study was approved (another NumPy): name it and
+    """The installed packages differ from those at the approval (another NumPy): report that and
     record it with the session, or refuse to run."""
 
     expected: tuple[str, ...] = ()

@@ -57,21 +57,21 @@ class Block(Section):
     ``group`` is given, or a list of names."""
 
     condition: PositiveInt | None = None
-    """Which of the participant's conditions it is of, from 1, in the order in which they come; the
+    """Number of the participant's condition, from 1, in the participant's order; the
     condition says which feedback is on."""
 
     fading: tuple[Annotated[float, Field(ge=0.0, le=1.0)], ...] = (1.0,)
-    """Share of the trials with feedback, part by part: ``[1, 0.5, 0]`` is all of the first third,
-    every second trial of the second, none of the last."""
+    """Share of the trials with feedback in each part of the block: ``[1, 0.5, 0]`` is all of the
+    first third, every second trial of the second, none of the last."""
 
     repeat: Annotated[PositiveInt, AtMost(1000)] = 1
-    """How many times the block is run, each time in a new order."""
+    """Number of repetitions of the block, each in a new order."""
 
     track: str = ""
-    """Which of the design's tracks chooses the levels of its factor, round by round."""
+    """The track of the design that chooses the levels of its factor, round by round."""
 
     until: Criterion | None = None
-    """For practice: it ends as soon as this is met."""
+    """For practice: the block ends as soon as this is met."""
 
     @field_validator("fading")
     @classmethod

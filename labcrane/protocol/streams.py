@@ -33,18 +33,18 @@ class StreamNeed(Settings):
     """LSL source id."""
 
     several: bool = False
-    """Whether all streams that fit are meant, and none is asked about. Otherwise one is, and a
+    """Whether all streams that fit are recorded, without confirmation. Otherwise one is, and a
     session does not begin while two fit: another program's stream derived from yours is of its type
     as well."""
 
     required: bool = True
-    """Whether a session starts only when it flows."""
+    """Whether a session starts only when the stream sends data."""
 
     rate_hz: Annotated[PositiveFloat | None, Usual(0.1, 50_000.0)] = None
-    """Nominal rate that is expected, in samples per second."""
+    """Expected nominal rate, in samples per second."""
 
     channels: Annotated[PositiveInt | None, Usual(1, 2000)] = None
-    """Number of channels that is expected."""
+    """Expected number of channels."""
 
     counter: str | None = None
     """Label of the channel that counts samples; its gaps are lost samples."""
@@ -55,8 +55,8 @@ class StreamNeed(Settings):
 
     space: Literal["screen", "scene"] | None = None
     """Reference of the pixels of a gaze stream: the participant's window (``screen``), or the scene
-    camera of a head-mounted tracker (``scene``), by which no area is looked at. What the stream's
-    own header states holds by default; where it states nothing, no gaze is measured."""
+    camera of a head-mounted tracker (``scene``), which gives no areas of interest. By default, the
+    stream's own header states it; where it does not, no gaze is measured."""
 
     min_delay_s: Annotated[NonNegativeFloat | None, Usual(1e-5, 2.0)] = None
     """For a device whose samples get their timestamps when they are sent: the shortest time from
@@ -145,7 +145,7 @@ class TimeLimits(Settings):
     """Uncertainty of corrected timestamps at 95 %, in seconds."""
 
     silent_s: WarnLimit = Limits().silent_s
-    """From a required regular stream's last sample to the end of the recording, in seconds."""
+    """Time from a required regular stream's last sample to the end of the recording, in seconds."""
 
     rate: WarnLimit = Limits().rate
     """Relative deviation of a stream's effective rate from its nominal rate."""
@@ -166,10 +166,10 @@ class TimeLimits(Settings):
     """Longest time without a trusted probe, in seconds."""
 
     missing: WarnLimit = Limits().missing
-    """Fraction of samples that a source's own counter says are lost."""
+    """Fraction of samples lost according to the source's own counter."""
 
     late: WarnLimit = Limits().late
-    """Fraction of the loop's ticks that woke more than a period after they were due."""
+    """Fraction of the loop's ticks that began more than a period late."""
 
     def limits(self) -> Limits:
         """Return the limits for the sync report."""

@@ -32,7 +32,7 @@ JUDGED = (Phase.SUCCESS, Phase.FAILURE, Phase.TIMEOUT)
 class UpDown(Settings):
     """A staircase: harder after some successes in a row, easier after some failures (Levitt 1971).
 
-    It settles where both are as likely: at 71 % of successes with 2 and 1, at 79 % with 3 and 1.
+    It converges to 71 % of successes with 2 and 1, and to 79 % with 3 and 1.
     """
 
     harder_after: PositiveInt = 2
@@ -42,14 +42,14 @@ class UpDown(Settings):
     """Failures in a row after which it gets easier."""
 
     steps: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1,)
-    """By how many levels, one number more after each change of direction; the last one stays:
+    """Step sizes in levels; each change of direction moves to the next one, and the last one stays:
     ``[4, 2, 1]``."""
 
     reversals: Annotated[int, Field(ge=2), AtMost(1000)] = 8
     """Changes of direction after which a block ends."""
 
     leave_out: NonNegativeInt = 2
-    """How many of the first of them are not in the estimate, the mean of the levels at the rest."""
+    """Number of first reversals left out of the estimate, the mean of the levels at the rest."""
 
     @field_validator("leave_out")
     @classmethod
@@ -72,7 +72,7 @@ class QuestPlus(Settings):
     """
 
     spreads: Annotated[tuple[PositiveFloat, ...], Field(min_length=1, max_length=20)]
-    """Spreads that are possible, in the levels' unit, each as likely; ``[0.5, 1, 2]``."""
+    """Possible spreads, in the levels' unit, all equally likely; ``[0.5, 1, 2]``."""
 
     guess: float = Field(default=0.0, ge=0.0, lt=1.0)
     """Probability of a success by chance."""
@@ -82,7 +82,7 @@ class QuestPlus(Settings):
 
     until_sd: PositiveFloat | None = None
     """A block ends when the standard deviation of the threshold is this or less, in the levels'
-    unit; without it, when all rounds are done."""
+    unit; otherwise when all rounds are done."""
 
     @field_validator("lapse")
     @classmethod
@@ -97,17 +97,18 @@ class QuestPlus(Settings):
 
 
 class Track(Settings):
-    """Levels of a factor that are chosen round by round, by what the participant has done.
+    """Levels of a factor that are chosen round by round, from the participant's results.
 
-    A round is what the task makes of one level: of ``aiming`` a pair of circles, with its approach.
+    A round consists of the trials that the task makes of one level: in ``aiming``, a pair of
+    circles with its approach.
     """
 
     factor: str
-    """Which factor of the task it is: ``pairs``."""
+    """The factor of the task: ``pairs``."""
 
     levels: Annotated[dict[str, FiniteFloat], Field(min_length=2, max_length=200)]
-    """How hard each of its levels is, a larger number being harder: ``{2m_far_left: 2,
-    4m_far_left: 4}``. Levels that are not named are not used."""
+    """Difficulty of each of its levels, a larger number being harder: ``{2m_far_left: 2,
+    4m_far_left: 4}``. Other levels are not used."""
 
     up_down: UpDown | None = None
     """A staircase chooses; either this or ``quest_plus``."""
@@ -120,20 +121,20 @@ class Track(Settings):
     QUEST+."""
 
     rounds: Annotated[PositiveInt, AtMost(1000)] = 40
-    """Most rounds of a block."""
+    """Maximum number of rounds of a block."""
 
     measure: str = ""
     """A result of the task by which successful trials are judged, within ``at_least`` and
-    ``at_most``: ``movement_time``. Without it a trial that succeeds is a success."""
+    ``at_most``: ``movement_time``. Without it, every trial that succeeds counts as a success."""
 
     at_least: FiniteFloat | None = None
-    """The least value of the measure that is a success, in its unit."""
+    """The smallest value of the measure that is a success, in its unit."""
 
     at_most: FiniteFloat | None = None
     """The largest value of the measure that is a success, in its unit."""
 
     carry: bool = True
-    """Whether a session goes on from what the participant did in the sessions before."""
+    """Whether a session continues from the participant's results in earlier sessions."""
 
     @field_validator("levels")
     @classmethod
