@@ -356,6 +356,6 @@ def test_every_unit_that_keys_ask_for_has_an_example_and_sizes_that_can_be_meant
     assert KINDS.keys() == EXAMPLES.keys() == PLAUSIBLE.keys() - {""}
     assert all(in_unit(example, unit) is not None for unit, example in EXAMPLES.items())
     with pytest.raises(
-        ValueError, match="'2 cm' is a length, where a number of pixels is asked for"
+        ValueError, match="'2 cm' is a length, where a number of pixels is required"
     ):
         in_unit("2 cm", "px")

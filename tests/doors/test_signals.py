@@ -124,7 +124,7 @@ def test_a_damaged_dbc_file_is_refused_in_words(tmp_path: Path) -> None:
         except ProtocolError as error:
             assert str(path) in str(error)  # noqa: PT017 - most damage is harmless
     path.write_bytes(b" " * 1_000_001)
-    with pytest.raises(ProtocolError, match="it has 1000001 bytes; the maximum is 1000000"):
+    with pytest.raises(ProtocolError, match="it has 1000001 bytes; the most are 1000000"):
         signal_names(path)
 
 

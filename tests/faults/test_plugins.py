@@ -66,7 +66,7 @@ def test_a_machine_that_cannot_be_reset_is_named_when_its_session_is_gone_on_wit
 NONSENSE = {
     ("input", "read", "nan"): "returned left.y nan in tick 49",
     ("input", "read", "short"): "returned shape (11,), but its signals need (12,) in tick 49",
-    ("input", "read", "nothing"): "returned NoneType, and not an array of float64 in tick 49",
+    ("input", "read", "nothing"): "returned NoneType, not an array of float64 in tick 49",
     ("scheme", "command", "nan"): "returned command.shoulder nan in tick",
     ("scheme", "command", "short"): "returned shape (",
     ("dynamics", "state", "nan"): "returned joint.angle.shoulder nan in tick",

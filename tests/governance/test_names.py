@@ -42,7 +42,9 @@ ANY = st.text(min_size=0, max_size=60)
 @example("P001\n")
 def test_a_name_that_passes_is_one_folder_of_its_own_on_every_disk(name: str) -> None:
     if misfit(name) is not None:
-        with pytest.raises(ProtocolError, match=r"(?s)^participant .+; (take|leave) "):
+        with pytest.raises(
+            ProtocolError, match=r"(?s)^participant .+; (use|give|remove|take|leave) "
+        ):
             check_name(name, "participant")
         return
     assert check_name(name, "participant") == name
@@ -264,7 +266,7 @@ def test_no_session_is_recorded_behind_a_link(tmp_path: Path) -> None:
     from labcrane.recording.data_folder import DataFolder
 
     assert study.protocol.study == "rehearsal"
-    with pytest.raises(RecordingError, match="is a link, and erasing never follows links"):
+    with pytest.raises(RecordingError, match="is a link, and links are never followed"):
         DataFolder(tmp_path, "P001", pilot=False, simulated=False).make()
 
 

@@ -292,7 +292,7 @@ def test_a_mesh_stands_where_the_file_has_it(tmp_path: Path) -> None:
             there = robot.get_transform(f"L{number}", "base") @ here
             assert frames[number + 1] @ own == pytest.approx(there, abs=1e-6)
     (tmp_path / "meshes" / "link.stl").unlink()
-    with pytest.raises(ProtocolError, match=r"meshes/link.stl' of 'L0' is not beside"):
+    with pytest.raises(ProtocolError, match=r"meshes/link.stl' of 'L0' is not next to"):
         described(fields, tmp_path)
 
 

@@ -461,8 +461,8 @@ def test_equivalence_and_non_inferiority_are_shown_as_often_as_statsmodels_shows
     ("kind", "margin", "message"),
     [
         ("difference", 0.3, "a margin of 0.3 is for equivalence or non-inferiority"),
-        ("equivalence", 0.0, "equivalence is shown against a margin, and 0 is none"),
-        ("non_inferiority", 0.0, "non_inferiority is shown against a margin, and 0 is none"),
+        ("equivalence", 0.0, "equivalence is shown against a margin, and 0 is not one"),
+        ("non_inferiority", 0.0, "non_inferiority is shown against a margin, and 0 is not one"),
     ],
 )
 def test_a_margin_belongs_to_its_claim(kind: str, margin: float, message: str) -> None:

@@ -101,7 +101,7 @@ class MachineDescription(StrictModel):
         path = folder / self.file
         if not is_file(path):
             raise ProtocolError(
-                f"machine file {str(path)!r} does not exist; a path counts from the protocol's "
+                f"machine file {str(path)!r} does not exist; paths are relative to the protocol's "
                 "folder",
                 at=("mjcf" if self.urdf is None else "urdf",),
             )
