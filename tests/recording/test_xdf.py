@@ -121,7 +121,7 @@ def test_header_says_labels_units_and_types_where_the_conventions_have_them(tmp_
 def test_an_existing_file_is_never_written_to(tmp_path: Path) -> None:
     path = tmp_path / "ses-01_run.xdf"
     path.write_text("somebody's data", encoding="utf-8")
-    with pytest.raises(RecordingError, match="exists already"):
+    with pytest.raises(RecordingError, match="already exists"):
         XdfWriter(path)
     assert path.read_text(encoding="utf-8") == "somebody's data"
 
