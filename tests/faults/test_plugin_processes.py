@@ -100,7 +100,7 @@ def test_a_component_that_hangs_is_named_and_its_process_ended(spoil: Spoil) -> 
     place = "task 'faulty_task' of plugin 'plugins/faulty.py', in evaluate() ("
     assert outcome.where.startswith(place)
     # A computer that is held up may have made it stand still before.
-    said = [line for line in told if "stood still" in line][-1]
+    said = [line for line in told if "not advanced" in line][-1]
     assert place in said
     tick = int(re.search(r"tick (\d+)", said)[1])
     session = recorded(protocol)

@@ -364,6 +364,6 @@ def check_copied(new: "h5py.File", old: "h5py.File", leave: Callable[[str], bool
     """
     for name in unlike(old, new, leave):
         raise RecordingError(
-            f"{name or 'its attributes'} of {old.filename} was not copied as it is; the file is "
-            "left as it is: check the disk"
+            f"{name or 'its attributes'} of {old.filename} was not copied unchanged; the file "
+            "itself is unchanged: check the disk"
         )
