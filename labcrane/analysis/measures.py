@@ -220,7 +220,7 @@ def measure(movement: Movement, machine: Machine, settings: MeasureSettings) -> 
         "constant_error": movement.result("error_along"),
         "absolute_error": movement.result("error"),
     }
-    how = {"measured_anew": float(movement.anew)}
+    how = {"measured_anew": float(movement.remeasured)}
     if set(OF_AIMING) <= movement.row.keys() and np.isnan(movement.result("movement_onset")):
         return nothing | how  # where the machine stood is not a measure of accuracy
     if span is None or span.stop - span.start < SHORTEST:

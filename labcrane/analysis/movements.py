@@ -52,7 +52,7 @@ class Movement:
         By name, ``left.x``; each of shape ``(n,)``, in [-1, 1].
     command, angles
         Joint speeds asked for in rad/s and joint angles in rad, shape ``(n, n_joints)``.
-    anew
+    remeasured
         Whether the recording used a former rule for onset and times, and ``row`` uses the present:
         :func:`by_todays_rule`.
     """
@@ -66,7 +66,7 @@ class Movement:
     axes: Mapping[str, FloatArray]
     command: FloatArray
     angles: FloatArray
-    anew: bool = False
+    remeasured: bool = False
 
     @cached_property
     def speed(self) -> FloatArray:
@@ -186,7 +186,7 @@ def by_todays_rule(movement: Movement, session: SessionRecord) -> Movement:
     )
     # Without an onset by the former rule the recording does not say when the movement ended.
     began = float(movement.elapsed[found]) if found is not None and not np.isnan(former) else np.nan
-    anew = {
+    again = {
         "reaction_time": reaction(movement.elapsed, movement.command),
         "movement_onset": began,
         "onset_speed": threshold,
@@ -194,14 +194,14 @@ def by_todays_rule(movement: Movement, session: SessionRecord) -> Movement:
         "movement_time": former + movement.result("movement_time") - began,
     }
     if "onset_to_rest" in row:
-        anew["onset_to_rest"] = former + movement.result("onset_to_rest") - began
+        again["onset_to_rest"] = former + movement.result("onset_to_rest") - began
     if "path_length" in row:
         ended = former + movement.result("movement_time")
         first = 0 if np.isnan(began) else found
         last = None if np.isnan(ended) else np.searchsorted(movement.elapsed, ended - ROUNDING_S)
         path = movement.tip[first : None if last is None else last + 1]
-        anew["path_length"] = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
-    return replace(movement, row={**row, **anew}, anew=True)
+        again["path_length"] = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+    return replace(movement, row={**row, **again}, remeasured=True)
 
 
 def events_of(session: SessionRecord) -> "pd.DataFrame":
@@ -218,7 +218,7 @@ def events_of(session: SessionRecord) -> "pd.DataFrame":
     time, data = events["time"].to_numpy(np.float64).copy(), list(events["data"])
     for movement in movements_of(session):
         began = movement.result("movement_onset")
-        if not movement.anew or np.isnan(began):
+        if not movement.remeasured or np.isnan(began):
             continue
         within = (time >= movement.due[0] - ROUNDING_S) & (time <= movement.due[-1] + ROUNDING_S)
         for at in np.flatnonzero(onsets & within):

@@ -550,11 +550,11 @@ def _by_which_rule(everything: "pd.DataFrame") -> str:
         "A movement begins when the tip is first faster than onset_speed for onset_hold, columns "
         "of the movements, and its halts are part of it; reaction_time is that of the sticks."
     )
-    anew = int((everything["measured_anew"] == 1.0).sum()) if "measured_anew" in everything else 0
-    if not anew:
+    again = int((everything["measured_anew"] == 1.0).sum()) if "measured_anew" in everything else 0
+    if not again:
         return rule
     return (
-        f"{rule} {anew} of {len(everything)} movements were recorded by a former rule, from the "
+        f"{rule} {again} of {len(everything)} movements were recorded by a former rule, from the "
         "onset of the fastest stroke, with reaction_time up to it: their reaction_time, "
         "movement_onset, movement_time, onset_to_rest and path_length were computed again, and are "
         "not those of the recording."
