@@ -213,6 +213,8 @@ def _nobody(folder: Path, left_out: Sequence[Participant]) -> str:
     counts = {str(s): sum(p.status is s for p in left_out) for s in Status}
     found = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
     remedies = [f"{p.name}: {p.why}" for p in left_out if p.status is Status.UNREADABLE]
+    if counts[str(Status.HALF_FINISHED)]:
+        remedies.append("labcrane resume continues an interrupted session")
     asked = [f"--include {status}" for status in INCLUDABLE if counts[str(status)]]
     if asked:
         remedies.append(f"to use them as well: {' '.join(asked)}")
@@ -229,6 +231,12 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
     path = participant_path(folder)
     if struck is not None:
         return Participant(folder.name, path, *struck)
+    if not path.exists():
+        why = (
+            "its session is still running, or was killed: labcrane resume continues it, and "
+            f"labcrane recover {folder} builds the participant file from what was recorded"
+        )
+        return Participant(folder.name, path, Status.UNREADABLE, why)
     try:
         recording = open_recording(path)
         if not recording.sessions:

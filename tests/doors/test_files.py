@@ -84,7 +84,7 @@ def test_a_recording_that_breaks_off_in_its_middle_is_left_out_by_itself(
     whole = main([*words, str(data), "--out", str(tmp_path / "out")])
     said = " ".join(capsys.readouterr().out.split())
     assert whole == 3, said
-    assert "left out: P001, unreadable:" in said
+    assert "left out: P001, cannot be used:" in said
     assert "1 recordings cannot be used: P001" in said
 
 

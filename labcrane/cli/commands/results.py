@@ -133,7 +133,7 @@ def _without_bad(attempt: "Callable[[Cohort], None]", cohort: "Cohort") -> "Coho
 
 
 def _leave_out(cohort: "Cohort", name: str, why: str) -> "Cohort":
-    out.print(f"left out: {name}, unreadable: {why}", markup=False)
+    out.print(f"left out: {name}, cannot be used: {why}", markup=False)
     return cohort.without(name, why)
 
 
