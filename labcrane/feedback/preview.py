@@ -1,6 +1,7 @@
 """Preview of a movement as pictures and sound files, without session, display or device."""
 
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,6 +29,7 @@ def write_preview(
     recording: Path | None = None,
     session: int = 1,
     trial: int | None = None,
+    say: Callable[[str], None] = print,
 ) -> list[Path]:
     """Write pictures and sounds of one movement with everything switched on.
 
@@ -37,11 +39,18 @@ def write_preview(
         Participant file with the movement; None simulates one.
     trial
         Number of the trial; None is the first counted one.
+    say
+        Told which views and sounds write no file.
 
     Returns
     -------
     list of Path
         The files written: pictures of every view, a sound file of every sound.
+
+    Raises
+    ------
+    ProtocolError
+        None of them writes a file, the study has none, or there is no such trial.
     """
     frames, scene = chosen(study, recording, session, trial)
     run = Rig.build(study, simulated=True).describe(study, participant_seed=0)
@@ -54,9 +63,20 @@ def write_preview(
                 cue.open(run)
             drawn = [_drawn(presenter, frame) for frame in frames]
             presenter.update(SessionState(scene=scene))
-            written += presenter.feedback.preview(run, drawn, folder / order.name)
+            files = presenter.feedback.preview(run, drawn, folder / order.name)
         finally:
             presenter.close()
+        written += files
+        if not files:
+            say(
+                f"feedback {order.name!r} writes no file: its plugin {order.part.use!r} has no "
+                "preview; a session presents it"
+            )
+    if not written:
+        raise ProtocolError(
+            f"{study.path}: nothing was written, as none of its views and sounds has a preview; "
+            "labcrane run --simulate --feedback presents them"
+        )
     return written
 
 

@@ -20,6 +20,12 @@ ANY, BARE = "any", "bare"
 COMMAND = "command"
 """Another kind of plugin, which fills no role."""
 
+PRESENTED = ("cue", "feedback")
+"""Kinds that run in a process of views and sounds, which a simulated session starts if asked to."""
+
+STANDS_IN = "# with --simulate; simulated_operator once a real device is read"
+"""Why an input is its own operator at first: a simulated session reads no other input."""
+
 GROUP = """
 # And this one names the group of its commands, which `labcrane --help` lists.
 [project.entry-points."labcrane.commands"]
@@ -78,6 +84,8 @@ def _templates(kind: str) -> dict[str, str]:
         found["pyproject.toml"] += GROUP
     else:
         found["protocol.yaml"] = _using(ROLES[role], found["protocol.yaml"])
+        if kind in PRESENTED:
+            found["README.md"] = found["README.md"].replace("--simulate", "--simulate --feedback")
         if not own.exists():
             found["my_module.py"] = _bare(role, found["my_module.py"])
     return found
@@ -87,13 +95,18 @@ def _using(entry: RoleEntry, protocol: str) -> str:
     """Return the protocol with the plugin in it, in place of what it uses of its role."""
     if not entry.keys:
         return protocol
-    key = entry.keys[0] if entry.several else entry.keys[-1]
+    key = entry.keys[0]
     written = re.search(rf"^{key}:.*\n(?:  .*\n)*", protocol, re.MULTILINE)
     if entry.several:
         named = re.search(r"^  (\w+):", written[0], re.MULTILINE) if written else None
         used = f"{key}:\n  {named[1] if named else 'my_part'}: {{use: my_part}}\n"
     else:
         used = f"{key}: {{use: my_part}}\n"
+    if entry.word == "input":
+        own = "operator: {use: my_part}"
+        protocol = re.sub(r"^operator:.*$", f"{own}  {STANDS_IN}", protocol, flags=re.MULTILINE)
+    if entry.word == "cue":  # which views draw
+        used += "views:\n  window: {use: view}\n"
     protocol = protocol.replace(written[0] if written else "sessions:\n", used, 1) + (
         f"      - {entry.step}: my_part\n" if entry.step else ""
     )

@@ -9,9 +9,7 @@ from needs import GRAPHICS, needs
 from rehearsal import ScriptedConsole, a_study
 
 import labcrane
-from labcrane import (
-    ProtocolError,
-)
+from labcrane import Feedback, ProtocolError
 from labcrane.feedback.preview import movement, write_preview
 from labcrane.session.session import Visit, run
 
@@ -56,3 +54,14 @@ def test_a_preview_shows_a_recorded_trial(tmp_path: Path) -> None:
 def test_a_study_without_feedback_has_no_preview(tmp_path: Path) -> None:
     with pytest.raises(ProtocolError, match="has neither views nor sounds; add views: or feedba"):
         write_preview(a_study(tmp_path), tmp_path / "out")
+
+
+def test_a_sound_without_a_preview_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("labcrane_sonification.sonification.Sonification.preview", Feedback.preview)
+    said: list[str] = []
+    with pytest.raises(ProtocolError, match="nothing was written, as none of its views and sounds"):
+        write_preview(a_study(tmp_path, FED), tmp_path / "out", say=said.append)
+    assert len(said) == 1
+    assert said[0].startswith("feedback 'tone' writes no file")

@@ -48,6 +48,17 @@ def test_nothing_is_left_to_fill_in(role: str, projects: dict[str, Path]) -> Non
     assert checked.returncode == 0, checked.stdout
 
 
+def test_what_the_readme_runs_does_start_the_plugin(projects: dict[str, Path]) -> None:
+    texts = {role: (projects[role] / "README.md").read_text(encoding="utf-8") for role in NAMES}
+    presented = {role for role, text in texts.items() if "--simulate --feedback" in text}
+    assert presented == {"cue", "feedback"}
+    lines = (projects["cue"] / "protocol.yaml").read_text(encoding="utf-8").splitlines()
+    assert "  window: {use: view}" in lines  # nothing else draws a cue
+    lines = (projects["input"] / "protocol.yaml").read_text(encoding="utf-8").splitlines()
+    assert "input: {use: my_input}" in lines
+    assert any(line.startswith("operator: {use: my_input}  # with --simulate") for line in lines)
+
+
 @pytest.mark.long
 def test_all_are_listed_where_they_are_installed(environment: Path, tmp_path: Path) -> None:
     done = run(environment, "-m", "labcrane", "plugins", "--json", cwd=tmp_path)

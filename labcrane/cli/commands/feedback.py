@@ -46,7 +46,9 @@ def preview(
         out.print(f"there is no display (DISPLAY is not set); files go to {FILES}/", markup=False)
     target = folder or FILES
     with _place(target, recording) as place:
-        written = write_preview(study, place, recording, session, trial)
+        written = write_preview(
+            study, place, recording, session, trial, lambda text: out.print(text, markup=False)
+        )
     for path in written:
         out.print(str(target / path.relative_to(place)), markup=False)
 
