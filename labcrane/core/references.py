@@ -55,11 +55,19 @@ class Reference:
 class Covers:
     """A mark on a mapping's type: its keys are all names of a kind.
 
-    With ``own``, all names that the component itself provides.
+    Attributes
+    ----------
+    kind
+        What the keys name.
+    own
+        Whether they name what the component itself provides.
+    otherwise
+        What a study can do whose input has fewer axes than there are names, for the message.
     """
 
     kind: str
     own: bool = False
+    otherwise: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,7 +69,7 @@ def directions(study: Study) -> Iterator[Finding]:
 
 def left_out(registry: Registry, study: Study | None) -> Sequence[str]:
     """Return what is not checked, and how to check it."""
-    return () if study else components.of_everything(registry)[1]
+    return components.unexamined(study) if study else components.of_everything(registry)[1]
 
 
 def keep_apart(found: Diagnosis, data: Path) -> Finding:

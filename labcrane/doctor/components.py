@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from labcrane.core.findings import Finding
 from labcrane.core.settings import Settings
 from labcrane.doctor import apart
+from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.study import Study
 from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.registry import Registry, discover
@@ -82,11 +83,6 @@ class PackedLook:
 
 def of_study(study: Study, registry: Registry) -> list[ExaminedPart]:
     """Return the examinations that a study needs; ``registry`` is the one it was loaded with."""
-    chosen = {
-        f"input {study.input.name}": study.input,
-        **{f"feedback {name}": choice for name, choice in (study.cues | study.sounds).items()},
-        **{f"view {name}": choice for name, choice in study.views.items()},
-    }
     words = {
         id(offer): ROLES[role].word
         for role, offers in registry.offers.items()
@@ -94,9 +90,28 @@ def of_study(study: Study, registry: Registry) -> list[ExaminedPart]:
     }
     return [
         ExaminedPart(area, words[id(choice.offer)], choice.name, choice.settings, study.path)
-        for area, choice in chosen.items()
+        for area, choice in _chosen(study).items()
         if choice.offer.examine is not None
     ]
+
+
+def unexamined(study: Study) -> list[str]:
+    """Return which devices of a study no plugin can look at, and what shows whether they work."""
+    drawn = {f"feedback {name}" for name in study.cues}
+    return [
+        f"{area}: plugin {choice.plugin!r} has no examine for it; a session with --pilot shows "
+        "whether it works"
+        for area, choice in _chosen(study).items()
+        if choice.offer.examine is None and area not in drawn
+    ]
+
+
+def _chosen(study: Study) -> dict[str, ComponentSpec]:
+    return {
+        f"input {study.input.name}": study.input,
+        **{f"feedback {name}": choice for name, choice in (study.cues | study.sounds).items()},
+        **{f"view {name}": choice for name, choice in study.views.items()},
+    }
 
 
 def of_everything(registry: Registry) -> tuple[list[ExaminedPart], list[str]]:

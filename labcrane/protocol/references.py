@@ -242,7 +242,8 @@ class ReferenceChecker:
             for name in [name for name in self._ordered(mark.kind, known) if name not in value]:
                 message = f"{_dotted(at)} has nothing for the {mark.kind} {name!r}; it needs one "
                 every = ", ".join(self._ordered(mark.kind, known))
-                self._source.problem(at, f"{message}for each of {every}")
+                message = f"{message}for each of {every}{self._otherwise(mark, len(known), at)}"
+                self._source.problem(at, message)
         elif isinstance(mark, Once):
             items = value.items() if isinstance(value, Mapping) else enumerate(value)
             first: dict[str, object] = {}
@@ -255,6 +256,16 @@ class ReferenceChecker:
                         message = f"{_dotted(at)} has {name!r} for {both}; give each its own"
                     self._source.problem((*at, key), message)
                 first.setdefault(name, key)
+
+    def _otherwise(self, mark: Covers, needed: int, at: Place) -> str:
+        """Return what can be done where the input has too few axes to cover all."""
+        axes = self._names("axis", at)
+        if not mark.otherwise or axes is None:
+            return ""
+        moved = axes - (self._of([("input",)], "button") or frozenset())
+        if len(moved) >= needed:
+            return ""
+        return f", and the input has {len(moved)} axes; {mark.otherwise}"
 
     def _ordered(self, kind: str, known: frozenset[str]) -> Sequence[str]:
         return self._machine.names if kind in {"joint", "link"} else sorted(known)

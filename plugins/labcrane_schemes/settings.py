@@ -37,6 +37,12 @@ FORMER_M_S = 0.5
 
 LARGEST_DEAD_ZONE = 0.5
 
+FEWER_AXES = (
+    "with three, use: end_effector moves the tip along three directions; with fewer, take a "
+    "machine with as many joints (machine: a YAML file, or urdf: with joints:)"
+)
+"""What a study can do whose input cannot turn every joint."""
+
 
 class HandlingSettings(Settings):
     """What every scheme does with a stick and near a joint limit."""
@@ -69,7 +75,7 @@ class HandlingSettings(Settings):
 class JointVelocitySettings(HandlingSettings):
     """Each axis turns one joint."""
 
-    map: Annotated[dict[JointName, AxisName], Covers("joint"), Once()]
+    map: Annotated[dict[JointName, AxisName], Covers("joint", otherwise=FEWER_AXES), Once()]
     """Which axis turns which joint, one for every joint of the machine. A positive slew is to the
     left and a positive pitch down, so that with two sticks ``slew: -left.x`` turns right when the
     left stick is pushed to the right, and ``shoulder: -right.y`` lifts when the right one is

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 import matplotlib
 import pytest
+from rehearsal import SHORT
 from ruamel.yaml import YAML
 
 import labcrane
@@ -109,6 +110,51 @@ def test_a_name_of_nothing_is_told_where_it_stands(
     assert {line.split(":")[0] for line in lines} <= {said.split(":", maxsplit=1)[0], "13", "14"}, (
         lines
     )
+
+
+STICK = """
+from labcrane import InputDevice, Settings, Signal, hookimpl, offer
+
+labcrane_api = 1
+
+
+class Stick(InputDevice):
+    signals = (Signal("stick", "1", ("x", "y", "twist")), Signal("button", "1"))
+
+    def __init__(self, settings, machine):
+        pass
+
+    def read(self, tick, seen):
+        raise NotImplementedError
+
+
+class StickSettings(Settings):
+    def provides(self, machine):
+        return {"button": ("button",)}
+
+
+@hookimpl
+def labcrane_inputs():
+    return [offer("one_stick", StickSettings, Stick)]
+"""
+
+
+def test_a_stick_with_fewer_axes_than_joints_is_told_what_can_be_done(tmp_path: Path) -> None:
+    (tmp_path / "plugins").mkdir()
+    (tmp_path / "plugins" / "one_stick.py").write_text(STICK, encoding="utf-8")
+    path = tmp_path / "protocol.yaml"
+    path.write_text(
+        SHORT.replace("input: {use: dual_joystick}", "input: {use: one_stick}").replace(
+            "map: {slew: -left.x, elbow: left.y, wrist: -right.x, shoulder: -right.y}",
+            "map: {slew: -stick.x, elbow: stick.y, wrist: -stick.twist}",
+        ),
+        encoding="utf-8",
+    )
+    with pytest.raises(ProtocolError) as refused:
+        load(path, discover(study=path))
+    said = str(refused.value)
+    assert "has nothing for the joint 'shoulder'; it needs one for each of slew, shoulder" in said
+    assert "the input has 3 axes; with three, use: end_effector moves the tip" in said
 
 
 def test_a_scene_that_the_dynamics_has_not_is_told(told) -> None:

@@ -15,7 +15,7 @@ from labcrane.cli.app import main
 from labcrane.core.findings import Finding, Verdict
 from labcrane.doctor import apart, components
 from labcrane.doctor.checks import examine, keep_apart
-from labcrane.doctor.components import ExaminedPart, of_everything, of_study
+from labcrane.doctor.components import ExaminedPart, of_everything, of_study, unexamined
 from labcrane.doctor.report import Check, diagnosis, keep, latest
 from labcrane.errors import RecordingError
 from labcrane.processes.handle import ProcessHandle
@@ -203,6 +203,15 @@ def test_a_study_needs_looks_at_what_it_uses_and_at_nothing_else() -> None:
     everything, left_out = of_everything(registry)
     assert {"dual_joystick", "sonification", "view"} <= {look.name for look in everything}
     assert left_out == ["input can: give --protocol with a study that uses it"]
+
+
+def test_a_device_that_no_plugin_can_look_at_is_named(tmp_path: Path) -> None:
+    registry = discover()
+    assert not unexamined(load(AIMING, registry))
+    protocol = tmp_path / "protocol.yaml"
+    protocol.write_text(SHORT.replace("{use: dual_joystick}", "{use: simulated_operator}", 1))
+    (line,) = unexamined(load(protocol, registry))
+    assert line.startswith("input simulated_operator: plugin 'operator' has no examine")
 
 
 @pytest.mark.slow
