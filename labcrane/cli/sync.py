@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from labcrane.cli.output import out
+from labcrane.cli.output import out, print_rows
 
 if TYPE_CHECKING:
     from labcrane.streams.sync.report.sync_report import SyncReport
@@ -12,17 +12,13 @@ STYLES = {"PASS": "green", "WARN": "yellow", "FAIL": "red"}
 
 def print_report(report: "SyncReport") -> None:
     """Print a sync report: a row per stream, the loop, and what to do."""
-    from rich.table import Table
-
     from labcrane.streams.sync.report.sync_report import COLUMNS
 
     verdict = report.verdict.value
     out.print(f"sync report: [{STYLES[verdict]}]{verdict}[/]")
     if report.streams:
-        table = Table(*COLUMNS)
-        for row in report.table():
-            table.add_row(*row, style=STYLES[row[1]])
-        out.print(table)
+        rows = report.table()
+        print_rows(COLUMNS, rows, [STYLES[row[1]] for row in rows])
     if loop := report.loop:
         out.print(
             f"loop: {loop.verdict.value}, {loop.ticks} ticks, {loop.late} late, {loop.dropped} "

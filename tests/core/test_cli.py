@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 from needs import needs
 from rehearsal import SHORT
+from rich.console import Console
 
 import labcrane
 from labcrane.cli.app import main
+from labcrane.cli.output import out, print_rows
 from labcrane.registry import LAB
 
 ROOT = Path(__file__).parents[2]
@@ -206,3 +208,16 @@ def test_what_describes_a_group_is_read_without_running_it(
         (tmp_path / "lamps" / "group.py").write_text(source, encoding="utf-8")
     assert description("lamps.group") == said
     assert "lamps" not in sys.modules
+
+
+@pytest.mark.parametrize("width", [40, 80])
+def test_no_word_of_a_table_is_cut_however_narrow_the_terminal(
+    width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    console = Console(width=width, soft_wrap=True, highlight=False)
+    monkeypatch.setattr(out, "console", console)
+    titles = ("stream", "verdict", "rate Hz", "carries")
+    print_rows(titles, [("amplifier [left]", "PASS", "500.0", "event-related potentials")])
+    said = capsys.readouterr().out
+    assert all(word in said for word in (*titles[1:], "amplifier [left]", "potentials"))
+    assert ("┃" in said) == (width == 80)

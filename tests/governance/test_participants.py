@@ -13,12 +13,14 @@ from needs import needs
 
 import labcrane
 from labcrane import DeviceError, ProtocolError
+from labcrane.cli.app import main
 from labcrane.participants import enrolment
 from labcrane.participants.deviations import all_deviations
 from labcrane.participants.personal_data import personal
 from labcrane.participants.register import changed, read
 from labcrane.session.commands import Command, Order
 from labcrane.session.eligibility import check_eligibility
+from labcrane.session.session import run
 
 TWO_SESSIONS = GOVERNED + (
     "  - name: retention\n    after_days: [1, 3]\n    steps:\n"
@@ -60,6 +62,22 @@ def test_a_session_leaves_approval_consent_slot_and_group_in_the_file(tmp_path: 
     assert session.attrs["consent_date"] == TODAY.isoformat()
     (sitting,) = entry.sessions
     assert (sitting.session, sitting.lock, sitting.deviations) == (1, lock.seal, [])
+
+
+@pytest.mark.slow
+def test_the_list_of_participants_says_which_session_is_owed(
+    lab: Lab, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def listed() -> str:
+        assert main(["participants", "--data", str(lab.places.root)]) == 0
+        return " ".join(capsys.readouterr().out.split())
+
+    lab.run("P001", {60: [Command(Order.END)]})
+    assert f"1 {TODAY} ended by order" in listed()
+    run(lab.visit("P001", fast=True, resumed=True), Willing())
+    assert f"1 {TODAY} complete" in listed()
+    (lab.places.raw("P001") / "P001.h5").unlink()
+    assert f"1 {TODAY} without participant file: it runs still, or was killed" in listed()
 
 
 @pytest.mark.slow

@@ -1,13 +1,16 @@
 """Commands about participants: the register, consent, deviations."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from labcrane.cli.commands.approval import today
 from labcrane.cli.options import DataBeside, ProtocolPath, data_folder, stay_on_this_computer
-from labcrane.cli.output import out, whole_table
+from labcrane.cli.output import out, print_rows, whole_table
+
+if TYPE_CHECKING:
+    from labcrane.participants.folders import Places
 
 Someone = Annotated[str, typer.Argument(metavar="PARTICIPANT", help="pseudonym: P001")]
 Reason = Annotated[str, typer.Option(help="why; no names")]
@@ -16,23 +19,30 @@ HERE = Path("data")
 
 
 def participants(data: Data = HERE) -> None:
-    """Show the register: slots, sessions, consent, exclusions."""
+    """Show the register: slots, sessions and how they ended, consent, exclusions."""
     from labcrane.participants.folders import Places
     from labcrane.participants.register import read
 
-    register = read(Places(data))
-    table = whole_table("participant", "slot", "group", "seed", "consent", "sessions", "excluded")
-    for name, entry in sorted(register.participants.items()):
-        table.add_row(
+    places = Places(data)
+    register = read(places)
+    titles = ("participant", "slot", "group", "seed", "consent", "sessions", "excluded")
+    rows = [
+        (
             name,
             f"{entry.slot}{'' if entry.holds_slot else ' (free)'}",
             entry.group or "-",
             str(entry.seed),
             ", ".join(f"{consent.version} {consent.date}" for consent in entry.consent) or "-",
-            ", ".join(f"{sitting.session} {sitting.date}" for sitting in entry.sessions) or "-",
+            ", ".join(
+                f"{sitting.session} {sitting.date} {_ended(places, name, sitting.session)}"
+                for sitting in entry.sessions
+            )
+            or "-",
             f"{entry.exclusion.date}: {entry.exclusion.reason}" if entry.exclusion else "-",
         )
-    out.print(table)
+        for name, entry in sorted(register.participants.items())
+    ]
+    print_rows(titles, rows)
     for name, entry in sorted(register.participants.items()):
         for text in entry.notes:
             out.print(f"{name}: {text}", markup=False)
@@ -40,6 +50,22 @@ def participants(data: Data = HERE) -> None:
         out.print(f"{stone.participant} erased on {stone.date}: {stone.reason}", markup=False)
     for export in register.exports:
         out.print(f"export {export.exporter} of {export.date}: {export.folder}", markup=False)
+
+
+def _ended(places: "Places", participant: str, session: int) -> str:
+    """Return how a session ended, as its participant file has it now."""
+    from labcrane.analysis.cohort import unfinished
+    from labcrane.errors import RecordingError
+    from labcrane.recording.participant_file.reader import open_recording
+    from labcrane.recording.paths import participant_path
+
+    path = participant_path(places.raw(participant))
+    if not path.exists():
+        return "without participant file: it runs still, or was killed"
+    try:
+        return unfinished(open_recording(path).session(session)) or "complete"
+    except RecordingError as error:
+        return f"cannot be read: {error}"
 
 
 def consent(

@@ -7,7 +7,7 @@ import typer
 
 from labcrane.cli.commands.approval import today
 from labcrane.cli.commands.results import LEFT_OUT, cohort_of
-from labcrane.cli.output import out
+from labcrane.cli.output import out, print_rows
 from labcrane.errors import LabcraneError
 
 if TYPE_CHECKING:
@@ -30,8 +30,6 @@ def score(
     ] = None,
 ) -> None:
     """Write the evaluation workbook: performance indicator, trend, recommended practice."""
-    from rich.table import Table
-
     from labcrane.analysis.cohort import kinds_of
     from labcrane.analysis.report.workbook import advice, write_csv, write_workbook
     from labcrane.analysis.scoring.operator_tests import operator_tests
@@ -56,12 +54,14 @@ def score(
     with product(folder, "score", path.resolve().parent, names, today(), whole=True) as made:
         write_workbook(tests, made.folder / path.name, kinds_of(cohort.included))
         write_csv(tests, made.folder / path.with_suffix(".csv").name)
-    table = Table("operator", "session", "trial", "scenario", "raw", "percent")
-    for test in tests:
-        raw, percent = test.indicator.raw, test.indicator.percent
-        where = (test.operator, str(test.session), str(test.trial), test.scenario)
-        table.add_row(*where, f"{raw:.1f}", f"{percent:.1f}")
-    out.print(table)
+    rows = [
+        (
+            *(test.operator, str(test.session), str(test.trial), test.scenario),
+            *(f"{test.indicator.raw:.1f}", f"{test.indicator.percent:.1f}"),
+        )
+        for test in tests
+    ]
+    print_rows(("operator", "session", "trial", "scenario", "raw", "percent"), rows)
     for each in advice(tests):
         out.print(f"{each.operator}, {each.about}: {each.verdict} ({each.evidence})", markup=False)
     out.print(f"workbook: {path}, and its tests as {path.with_suffix('.csv').name}", markup=False)
