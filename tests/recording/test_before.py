@@ -45,6 +45,8 @@ ONSET = "movement.onset"
 """It is told as soon as it is known since, and no more with the trial's end."""
 ADDED_SETTINGS = {"axes": [], "button": None}
 """What the simulated operator can be told since, and what that is where it is not."""
+DEFINITION = "definition"
+"""What columns of the loop and of all trials say of themselves since."""
 ABOUT_THE_FILE = {"README", "dataset_description", "CITATION"}
 """What every participant file says of itself since."""
 ADDED_COLUMNS = {
@@ -131,7 +133,7 @@ def datasets(folder: Path) -> dict[str, tuple[Any, dict[str, Any]]]:
             attributes = {
                 name: value
                 for name, value in node.attrs.items()
-                if name not in {"REFERENCE_LIST", "DIMENSION_LIST"}
+                if name not in {"REFERENCE_LIST", "DIMENSION_LIST", DEFINITION}
             }
             found[path] = (node[()], attributes)
 

@@ -11,6 +11,7 @@ from recording.journals import COLUMNS, CONTEXT, frames, stamp, write
 
 from labcrane import RecordingError
 from labcrane.recording.journal import Column, SessionJournal
+from labcrane.recording.frame_log import LOOP
 from labcrane.recording.participant_file import writer
 from labcrane.recording.participant_file.reader import Recording, open_recording
 from labcrane.recording.participant_file.recover import recover
@@ -151,6 +152,18 @@ def test_units_of_trials_are_those_of_the_context(path: Path) -> None:
     with h5py.File(path) as file:
         assert file["ses-01/trials/movement_time"].attrs["unit"] == "s"
         assert file["ses-01/trials/width"].attrs["unit"] == "1"
+
+
+def test_the_file_says_what_its_phases_and_trial_numbers_mean(path: Path) -> None:
+    with h5py.File(path) as file:
+        said = file["ses-01/loop/trial"].attrs["definition"]
+        assert said == "number of the trial under way; 0 between trials"
+        assert "on the screen" in file["ses-01/trials/trial"].attrs["definition"]
+        readme = file["README"][()].decode()
+    (phase,) = (each for each in LOOP if each.name == "phase")
+    assert phase.definition.startswith("0 idle, 1 running, 2 success")
+    assert "trial 8 there may be 10 here" in readme
+    assert "docs of labcrane" in readme
 
 
 def test_long_columns_are_compressed(folder: Path) -> None:

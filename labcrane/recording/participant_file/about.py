@@ -36,14 +36,17 @@ operator's controls and of the streams of other devices, on one clock. No name o
 
 Each group ses-01, ses-02 ... is a session:
   time             seconds, one for each tick; what follows is as long as it
+  loop             of each tick: its trial, its phase as a number, pauses; attributes define them
   input, command, state, task   one column per number, with its unit as an attribute
-  trials           one row per trial: condition and results
+  trials           one row per trial: condition and results. trial counts all trials of the plan;
+                   screens count only those with results, so that trial 8 there may be 10 here
   events           what happened when; data is JSON
   questionnaires   what was answered
   streams          signals of other devices: time is on the session's clock, time_raw is not
   context          all that was known at the start, as JSON: versions, settings, units
   sync_report      accuracy of the times
 dataset_description is JSON-LD of schema.org; CITATION says how to cite the software.
+Documentation: the folder docs of labcrane{version}: file-format.md, results.md.
 
 Python  h5py.File(path)["ses-01/state/joint/angle/slew"][:], or labcrane.open_recording(path)
 R       rhdf5::h5read(path, "ses-01/trials")
@@ -60,7 +63,9 @@ def write_about(file: "h5py.File", context: Mapping[str, Any]) -> None:
     """Write the description of a participant file into it, once it contains its sessions."""
     title, study = str(context.get("title", "")), str(context.get("study", ""))
     version = str(context.get("versions", {}).get("labcrane", ""))
-    write_text(file, README, TEXT.format(title=title or study, study=study))
+    of_version = f" {version}" if version else ""
+    text = TEXT.format(title=title or study, study=study, version=of_version)
+    write_text(file, README, text)
     description = {
         "@context": "https://schema.org/",
         "@type": "Dataset",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from labcrane.recording.frame_log import LOOP
 from labcrane.recording.journal_reader import JournalState, LoggedEvent, SessionLog
 from labcrane.recording.participant_file.column_writer import ColumnWriter
 from labcrane.recording.participant_file.columns import (
@@ -17,6 +18,7 @@ from labcrane.recording.participant_file.columns import (
     write_values,
 )
 from labcrane.recording.participant_file.questionnaires import write_questionnaires
+from labcrane.recording.trial_columns import OWN
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -78,8 +80,9 @@ def _write_frames(group: "h5py.Group", log: SessionLog) -> None:
     for block in log.blocks():
         writer.write(block)
     writer.close()
+    defined = {f"loop/{each.name}": {"definition": each.definition} for each in LOOP}
     for number, (path, _) in enumerate(columns):
-        write_attributes(group[path], {"position": number})
+        write_attributes(group[path], {"position": number, **defined.get(path, {})})
 
 
 def event_columns(
@@ -166,7 +169,8 @@ def _set_after(log: SessionLog) -> dict[tuple[object, object], int]:
 def _write_trials(group: "h5py.Group", log: SessionLog) -> None:
     rows = _trial_rows(log)
     units = log.context.get("trial_units", {})
-    definitions = log.context.get("trial_definitions", {})
+    own = {each.name: each.definition for each in OWN}
+    definitions = {**own, **log.context.get("trial_definitions", {})}
     columns = list(dict.fromkeys(name for row in rows for name in row if name != COUNTED))
     for number, (name, safe) in enumerate(node_names(columns)):
         write_values(group, safe, [row.get(name) for row in rows], units.get(name))
