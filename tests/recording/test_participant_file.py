@@ -10,8 +10,8 @@ import pytest
 from recording.journals import COLUMNS, CONTEXT, frames, stamp, write
 
 from labcrane import RecordingError
-from labcrane.recording.journal import Column, SessionJournal
 from labcrane.recording.frame_log import LOOP
+from labcrane.recording.journal import Column, SessionJournal
 from labcrane.recording.participant_file import writer
 from labcrane.recording.participant_file.reader import Recording, open_recording
 from labcrane.recording.participant_file.recover import recover
