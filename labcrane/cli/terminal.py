@@ -19,6 +19,7 @@ from labcrane.core.records import Event, is_done
 from labcrane.core.roles import Questionnaire
 from labcrane.design.counts import TrialCounts
 from labcrane.session.commands import Command, Order, QueueConsole
+from labcrane.session.standing import SessionStage, Standing
 
 KEYS: Mapping[str, Order] = {
     " ": Order.START,
@@ -45,6 +46,13 @@ PROMPTS: Mapping[Order, str] = {
 }
 """Prompts of actions that need words."""
 
+AWAITING = {SessionStage.WAITING, SessionStage.JUDGEMENT, SessionStage.QUESTIONNAIRE}
+"""Stages in which a session waits for an order."""
+
+LOOK_S = 0.1
+PATIENCE_S = 2.0
+"""How long a session waits without any way to give orders."""
+
 HELP = (
     "space start/continue · p pause · r repeat · s skip · e end · n note · o override · "
     "c completion · h hint · f feedback setting · t take a stream · q fill in the questionnaire"
@@ -63,6 +71,8 @@ class Terminal:
         Names and number of the session's trials.
     keys
         Whether to listen at all; a simulated session needs no person.
+    alone
+        Whether only the terminal gives orders, as there is no page.
     """
 
     def __init__(
@@ -73,7 +83,10 @@ class Terminal:
         *,
         keys: bool,
         questionnaires: Mapping[str, Questionnaire] | None = None,
+        alone: bool = False,
     ) -> None:
+        self._standing = Standing()
+        self._alone = alone
         self._sheets = Sheets(questionnaires or {})
         self._sheet: Sheet | None = None
         self._console = console
@@ -115,6 +128,7 @@ class Terminal:
     def _print(self) -> None:
         while (event := self._console.events.get()) is not None:
             self._sheet = self._sheets(event, self._sheet)
+            self._standing = self._standing.after(event.name, event.data)
             if event.name == "trial.end" and event.data["counted"]:
                 if is_done(event.data):
                     self._progress.advance(self._bar)
@@ -129,10 +143,30 @@ class Terminal:
         if not sys.stdin.isatty():
             for line in lines(self._over):
                 self._line(line)
-            return
-        with single_keys():
-            while key := next_key(self._over):
-                self._key(key.lower())
+        else:
+            with single_keys():
+                while key := next_key(self._over):
+                    self._key(key.lower())
+        if self._alone:
+            self._end_where_it_waits()
+
+    def _end_where_it_waits(self) -> None:
+        """End the session once it waits for an order, as who gave them is gone.
+
+        Trials that run are run to their end, and an order that came last is given time to be done.
+        """
+        waited = 0.0
+        while waited < PATIENCE_S:
+            if self._over.wait(LOOK_S):
+                return
+            standing = self._standing
+            waits = standing.paused or standing.stage in AWAITING
+            waited = waited + LOOK_S if waits else 0.0
+        self.say(
+            "the standard input has ended and there is no page, so that nobody can give orders: "
+            "the session ends"
+        )
+        self._console.give(Command(Order.END))
 
     def _line(self, line: str) -> None:
         word, _, text = line.partition(" ")

@@ -116,7 +116,10 @@ else:
         key = ""
         while not key and not over.is_set():
             if select.select([sys.stdin], [], [], POLL_S)[0]:
-                byte = os.read(sys.stdin.fileno(), 1)
+                try:
+                    byte = os.read(sys.stdin.fileno(), 1)
+                except OSError:  # a terminal that was hung up
+                    byte = b""
                 if not byte:
                     return ""
                 key = letters.decode(byte)  # nothing while the rest of a letter is to come

@@ -17,7 +17,7 @@ from labcrane import open_recording
 from labcrane.cli.terminal import Terminal
 from labcrane.core import Event
 from labcrane.design.counts import TrialCounts
-from labcrane.session.commands import QueueConsole
+from labcrane.session.commands import Command, Order, QueueConsole
 
 
 class TerminalUser:
@@ -141,6 +141,44 @@ def test_a_questionnaire_is_filled_in_at_the_terminal(tmp_path: Path) -> None:
     scores = table[table["kind"] == "score"].set_index("questionnaire")["value"]
     assert scores["subjective_accuracy"] == 0.7
     assert scores.isna()["situational_awareness"]
+
+
+@pytest.mark.parametrize("alone", [True, False], ids=["no page", "a page"])
+def test_without_terminal_and_page_a_session_ends_where_it_waits(
+    alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("labcrane.cli.terminal.PATIENCE_S", 0.1)
+    console, printed = QueueConsole(), io.StringIO()
+    given: list[Command] = []
+    with (
+        Path(os.devnull).open(encoding="utf-8") as nobody,
+        monkeypatch.context() as patched,
+    ):
+        patched.setattr("sys.stdin", nobody)
+        shown = Console(file=printed, width=200)
+        with Terminal(console, shown, TrialCounts({}, {}), keys=True, alone=alone):
+            time.sleep(0.3)
+            given += console.commands()
+            assert not given  # a trial that runs would be run to its end
+            console.report(Event("waiting", 1.0, {"what": "block 1"}))
+            time.sleep(0.5)
+            given += console.commands()
+    assert given == ([Command(Order.END)] if alone else [])
+    assert ("there is no page, so that nobody can give orders" in printed.getvalue()) == alone
+
+
+@pytest.mark.slow
+def test_a_session_that_nobody_can_start_is_kept_to_be_gone_on_with(folder: Path) -> None:
+    command = [sys.executable, "-m", "labcrane", "run", "study.yaml", "--no-page"]
+    done = subprocess.run(
+        [*command, "--participant", "P002", "--local", "--pilot"],
+        cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
+        timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "go on with: labcrane resume" in " ".join(done.stdout.split())
+    session = open_recording(folder / "data" / "P002-PILOT" / "P002-PILOT.h5").session(1)
+    assert session.events["data"].tolist()[-1]["reason"] == "by order"
 
 
 def test_a_refused_order_is_called_as_it_is_given() -> None:

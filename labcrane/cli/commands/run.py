@@ -226,7 +226,9 @@ def _launch(visit: "Visit", *, page: bool) -> None:
     with (
         # Before any other process is started: they must not use that core.
         reserved_core() if visit.real_time else nullcontext() as core,
-        Terminal(console, shown, counts, keys=keys, questionnaires=asked) as terminal,
+        Terminal(
+            console, shown, counts, keys=keys, questionnaires=asked, alone=not page
+        ) as terminal,
     ):
         visit = replace(visit, core=core)
         launcher = Launcher(visit, console, terminal.say)
