@@ -5,16 +5,67 @@ from typing import Annotated
 
 import typer
 
+from labcrane.errors import ProtocolError
+
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON, for scripts")]
 PROTOCOL_FILE = "protocol.yaml"
+DATA = "data"
+YAML = (".yaml", ".yml")
+STUDY = "the study: its folder, its protocol or its data folder"
 
 
 def protocol_in(path: Path | None) -> Path | None:
-    """Return a study's file where its folder was given."""
+    """Return a study's file where its folder was given, or the data folder in it.
+
+    Raises
+    ------
+    ProtocolError
+        A folder was given, and there is none in it.
+    """
+    if path is None or not path.is_dir():
+        return path
+    if (inside := path / PROTOCOL_FILE).is_file():
+        return inside
+    beside = path.absolute().parent / PROTOCOL_FILE
+    if path.absolute().name == DATA and beside.is_file():
+        return beside
+    raise ProtocolError(
+        f"there is no {PROTOCOL_FILE} in {path.absolute()}; give the study's YAML file, or a "
+        f"folder with {PROTOCOL_FILE}"
+    )
+
+
+def data_in(path: Path | None) -> Path | None:
+    """Return a study's data folder where the study's folder or its protocol was given."""
     if path is None:
         return None
-    inside = path / PROTOCOL_FILE
-    return inside if inside.is_file() else path
+    if path.suffix in YAML and path.is_file():
+        return path.parent / DATA
+    if (path / PROTOCOL_FILE).is_file():
+        return path / DATA
+    return path
+
+
+def data_here() -> Path:
+    """Return the data folder of the study whose folder this is; this one where it is the data."""
+    here = Path().absolute()
+    inside = here.name == DATA and (here.parent / PROTOCOL_FILE).is_file()
+    return Path() if inside or Path("register").is_dir() else Path(DATA)
+
+
+def one_study(data: Path | None, study: Path | None = None) -> Path:
+    """Return the data folder of a study that is ``--data`` or an argument, or is here.
+
+    Raises
+    ------
+    ProtocolError
+        Both were given.
+    """
+    if study is not None and data is not None:
+        raise ProtocolError(
+            f"the study was given twice, as {study} and as --data {data}; give it once"
+        )
+    return study or data or data_here()
 
 
 ProtocolPath = Annotated[
@@ -25,6 +76,34 @@ ProtocolPath = Annotated[
         callback=protocol_in,
     ),
 ]
+ProtocolHere = Annotated[
+    Path,
+    typer.Argument(
+        metavar="PROTOCOL",
+        help=f"the study's YAML file, or a folder with {PROTOCOL_FILE}",
+        callback=protocol_in,
+        default_factory=Path,
+        show_default="here",
+    ),
+]
+StudyData = Annotated[
+    Path,
+    typer.Argument(
+        metavar="STUDY",
+        help=STUDY,
+        callback=data_in,
+        default_factory=data_here,
+        show_default="here",
+    ),
+]
+StudyOrHere = Annotated[
+    Path | None,
+    typer.Argument(metavar="STUDY", help=STUDY, callback=data_in, show_default="here"),
+]
+DataOrHere = Annotated[
+    Path | None,
+    typer.Option("--data", help=STUDY, callback=data_in, show_default="here"),
+]
 DataBeside = Annotated[
     Path | None, typer.Option(help="data folder; by default data/ in the protocol's folder")
 ]
@@ -32,7 +111,7 @@ DataBeside = Annotated[
 
 def data_folder(data: Path | None, protocol: Path | None) -> Path:
     """Return the given data folder, or the one in the protocol's folder, or data/ here."""
-    return data or (protocol.parent if protocol else Path()) / "data"
+    return data or (protocol.parent if protocol else Path()) / DATA
 
 
 Local = Annotated[bool, typer.Option("--local", help="keep LSL streams on this computer")]

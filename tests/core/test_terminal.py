@@ -145,7 +145,7 @@ def test_a_questionnaire_is_filled_in_at_the_terminal(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("alone", [True, False], ids=["no page", "a page"])
 def test_without_terminal_and_page_a_session_ends_where_it_waits(
-    alone: bool, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch, *, alone: bool
 ) -> None:
     monkeypatch.setattr("labcrane.cli.terminal.PATIENCE_S", 0.1)
     console, printed = QueueConsole(), io.StringIO()

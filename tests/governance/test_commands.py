@@ -11,6 +11,8 @@ from governed import GOVERNED, TODAY
 
 import labcrane
 from labcrane.cli.app import main
+from labcrane.participants.folders import Places
+from labcrane.participants.register import Entry, changed
 
 
 @pytest.fixture
@@ -189,3 +191,46 @@ def test_who_is_not_in_the_register_is_told(
     ):
         said = say(capsys, *command, status=2)
         assert "participant P009 is not in the register; it has P001" in said
+
+
+@pytest.mark.parametrize(
+    ("here", "words"),
+    [
+        ("..", ["my_study"]),
+        ("..", ["my_study/protocol.yaml"]),
+        ("..", ["my_study/data"]),
+        ("..", ["--data", "my_study"]),
+        (".", []),
+        (".", ["data"]),
+        ("data", []),
+    ],
+)
+def test_a_study_is_where_you_are_or_its_folder_its_protocol_or_its_data(
+    here: str,
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    folder = tmp_path / "my_study"
+    (folder / "data").mkdir(parents=True)
+    (folder / "protocol.yaml").write_text(GOVERNED, encoding="utf-8")
+    with changed(Places(folder / "data")) as register:
+        register.study = "rehearsal"
+        register.participants["P001"] = Entry(slot=1, seed=1, enrolled="2026-01-02")
+    monkeypatch.chdir(folder / here)
+    assert "P001" in say(capsys, "participants", *words)
+    assert "no deviations" in say(capsys, "deviations", *words)
+    if "--data" not in words:  # the commands of results take an argument only
+        said = say(capsys, "report", *words, status=1)
+        assert "there is no participant in" in said
+        assert "data; give the folder" in said or here == "data"
+        said = say(capsys, "check", *words)
+        assert "study 'rehearsal' is fine" in said
+
+
+def test_a_study_that_is_given_twice_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ("participants", str(tmp_path), "--data", str(tmp_path))
+    assert "was given twice" in say(capsys, *words, status=2)

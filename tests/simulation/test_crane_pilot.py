@@ -78,7 +78,9 @@ def test_a_folder_stands_for_its_protocol(
     assert "study 'crane_pilot' is fine" in said.out
     assert said.err == ""
     assert main(["check", str(tmp_path)]) == 2
-    assert f"{tmp_path} is not a file; give the path of a YAML file" in capsys.readouterr().err
+    assert (
+        f"there is no protocol.yaml in {tmp_path}; give the study's YAML" in capsys.readouterr().err
+    )
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labcrane.cli.options import ProtocolPath
+from labcrane.cli.options import ProtocolHere, ProtocolPath
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def approve(
-    protocol: ProtocolPath,
+    protocol: ProtocolHere,
     board: Annotated[str, typer.Option(help="the board that approved the study")],
     reference: Annotated[str, typer.Option(help="the board's reference number of the approval")],
     valid_until: Annotated[str, typer.Option(help="last day on which people may take part")],
@@ -63,7 +63,7 @@ def _rehearse(study: "Study") -> None:
 
 
 def amend(
-    protocol: ProtocolPath,
+    protocol: ProtocolHere,
     why: Annotated[str, typer.Option(help="why it was changed")],
     reference: Annotated[str, typer.Option(help="the board's reference number of the amendment")],
     board: Annotated[str | None, typer.Option(help="as before by default")] = None,
@@ -93,7 +93,7 @@ def amend(
 
 
 def methods(
-    protocol: ProtocolPath,
+    protocol: ProtocolHere,
     codebook: Annotated[Path | None, typer.Option(help="the codebook's path: a CSV file")] = None,
 ) -> None:
     """Write the Methods paragraph and the codebook of an approved study."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labcrane.cli.options import AsJson, DataBeside, ProtocolPath, data_folder
+from labcrane.cli.options import AsJson, DataBeside, ProtocolHere, data_folder
 from labcrane.cli.output import out
 from labcrane.errors import LabcraneError
 
@@ -35,7 +35,7 @@ def new_study(
 
 
 def check(
-    protocol: ProtocolPath,
+    protocol: ProtocolHere,
     as_json: AsJson = False,
     simulated: Annotated[
         bool,
@@ -114,7 +114,7 @@ def examined(
 
 
 def plan(
-    protocol: ProtocolPath,
+    protocol: ProtocolHere,
     participants: Annotated[
         int | None,
         typer.Option(help="number of participants to list; the planned number by default", min=1),

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labcrane.cli.commands.approval import today
-from labcrane.cli.commands.participants import HERE, Data, Reason, Someone
+from labcrane.cli.commands.participants import Reason, Someone
+from labcrane.cli.options import DataOrHere, one_study
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError
 
@@ -19,14 +20,17 @@ if TYPE_CHECKING:
     from labcrane.participants.inventory import InventoryEntry
 
 
-def where(participant: Someone, data: Data = HERE) -> None:
+def where(participant: Someone, data: DataOrHere = None) -> None:
     """List every place that holds a participant's data."""
     from labcrane.participants.folders import Places
     from labcrane.participants.inventory import inventory
 
-    found = inventory(Places(data), participant)
+    places = Places(one_study(data))
+    found = inventory(places, participant)
     if not found:
-        out.print(f"{data} and its register contain no data of {participant}", markup=False)
+        out.print(
+            f"{places.root} and its register contain no data of {participant}", markup=False
+        )
         return
     _list(found)
 
@@ -35,14 +39,14 @@ def erase(
     participant: Someone,
     reason: Reason,
     yes: Annotated[bool, typer.Option("--yes", help="do not ask; for scripts")] = False,
-    data: Data = HERE,
+    data: DataOrHere = None,
 ) -> None:
     """Erase a participant's data from everything labcrane wrote; an erasure record stays."""
     from labcrane.participants import recovery as unfinished
     from labcrane.participants.erasure import BEYOND
     from labcrane.participants.folders import Places
 
-    places = Places(data)
+    places = Places(one_study(data))
     if not yes:
         _confirm_erasure(places, participant)
     done = unfinished.erase(places, participant, reason, today())
@@ -87,24 +91,25 @@ def relabel(
     participant: Someone,
     to: Annotated[str, typer.Argument(help="the correct pseudonym")],
     reason: Reason = "wrong number entered",
-    data: Data = HERE,
+    data: DataOrHere = None,
 ) -> None:
     """Correct a wrong pseudonym in files, journals, register and exports."""
     from labcrane.participants import recovery as unfinished
     from labcrane.participants.folders import Places
 
-    _say(unfinished.correct(Places(data), participant, to, reason, today()))
+    _say(unfinished.correct(Places(one_study(data)), participant, to, reason, today()))
     out.print(f"{participant} is {to} now; labcrane deviations says how it was run", markup=False)
 
 
 def transfer(
-    to: Annotated[Path, typer.Argument(help="folder of the lab's storage")], data: Data = HERE
+    to: Annotated[Path, typer.Argument(help="folder of the lab's storage")],
+    data: DataOrHere = None,
 ) -> None:
     """Copy finished sessions to the lab's storage and verify both copies (SHA-256)."""
     from labcrane.participants import recovery as unfinished
     from labcrane.participants.folders import Places
 
-    done = unfinished.move(Places(data), to)
+    done = unfinished.move(Places(one_study(data)), to)
     out.print(
         f"{len(done.copied)} files copied; {done.equal} files are equal on both sides (SHA-256)"
     )

@@ -8,14 +8,14 @@ from typing import Annotated
 
 import typer
 
-from labcrane.cli.options import ProtocolPath, stay_on_this_computer
+from labcrane.cli.options import ProtocolHere, stay_on_this_computer
 from labcrane.cli.output import out
 
 FILES = Path("preview")
 
 
 def preview(
-    protocol: ProtocolPath,
+    protocol: ProtocolHere,
     folder: Annotated[
         Path | None,
         typer.Option("--to", help="write PNG and WAV files to this folder instead of showing them"),

@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labcrane.cli.commands.approval import today
-from labcrane.cli.options import DataBeside, ProtocolPath, data_folder, stay_on_this_computer
+from labcrane.cli.options import (
+    STUDY,
+    DataBeside,
+    DataOrHere,
+    ProtocolPath,
+    StudyOrHere,
+    data_folder,
+    one_study,
+    stay_on_this_computer,
+)
 from labcrane.cli.output import out, print_rows, whole_table
 
 if TYPE_CHECKING:
@@ -14,16 +23,14 @@ if TYPE_CHECKING:
 
 Someone = Annotated[str, typer.Argument(metavar="PARTICIPANT", help="pseudonym: P001")]
 Reason = Annotated[str, typer.Option(help="why; no names")]
-Data = Annotated[Path, typer.Option(help="the study's data folder")]
-HERE = Path("data")
 
 
-def participants(data: Data = HERE) -> None:
+def participants(study: StudyOrHere = None, data: DataOrHere = None) -> None:
     """Show the register: slots, sessions and how they ended, consent, exclusions."""
     from labcrane.participants.folders import Places
     from labcrane.participants.register import read
 
-    places = Places(data)
+    places = Places(one_study(data, study))
     register = read(places)
     titles = ("participant", "slot", "group", "seed", "consent", "sessions", "excluded")
     rows = [
@@ -42,7 +49,10 @@ def participants(data: Data = HERE) -> None:
         )
         for name, entry in sorted(register.participants.items())
     ]
-    print_rows(titles, rows)
+    if rows:
+        print_rows(titles, rows)
+    else:
+        out.print(f"nobody is enrolled in {places.root}", markup=False)
     for name, entry in sorted(register.participants.items()):
         for text in entry.notes:
             out.print(f"{name}: {text}", markup=False)
@@ -108,47 +118,47 @@ def exclude(
     keep_slot: Annotated[
         bool, typer.Option("--keep-slot", help="do not release the slot to another participant")
     ] = False,
-    data: Data = HERE,
+    data: DataOrHere = None,
 ) -> None:
     """Exclude a participant (dropout or unusable data) and release the slot."""
     from labcrane.participants import enrolment
     from labcrane.participants.folders import Places
 
-    enrolment.exclude(Places(data), participant, reason, today(), keep_slot=keep_slot)
+    enrolment.exclude(Places(one_study(data)), participant, reason, today(), keep_slot=keep_slot)
     out.print(f"{participant} is excluded", markup=False)
 
 
 def note(
     participant: Someone,
     text: Annotated[str, typer.Argument(help="the note; no names")],
-    data: Data = HERE,
+    data: DataOrHere = None,
 ) -> None:
     """Add a note about a participant (no names)."""
     from labcrane.participants import enrolment
     from labcrane.participants.folders import Places
 
-    enrolment.note(Places(data), participant, text)
+    enrolment.note(Places(one_study(data)), participant, text)
 
 
 def waive(
     participant: Someone,
     reason: Reason,
     session: Annotated[int, typer.Option(help="which session", min=2)],
-    data: Data = HERE,
+    data: DataOrHere = None,
 ) -> None:
     """Allow a session outside its time window; recorded as a deviation."""
     from labcrane.participants import enrolment
     from labcrane.participants.folders import Places
 
-    enrolment.waive(Places(data), participant, session, reason, today())
+    enrolment.waive(Places(one_study(data)), participant, session, reason, today())
 
 
-def deviations(data: Data = HERE) -> None:
+def deviations(study: StudyOrHere = None, data: DataOrHere = None) -> None:
     """List protocol deviations."""
     from labcrane.participants.deviations import all_deviations
     from labcrane.participants.folders import Places
 
-    found = all_deviations(Places(data))
+    found = all_deviations(Places(one_study(data, study)))
     table = whole_table("participant", "session", "trial", "what", "detail")
     for name, deviation in found:
         where = [str(number) if number else "-" for number in (deviation.session, deviation.trial)]
@@ -158,7 +168,14 @@ def deviations(data: Data = HERE) -> None:
 
 def study(
     folder: Annotated[
-        Path, typer.Argument(metavar="FOLDER", help="a study's folder, or the data folder in it")
+        Path,
+        typer.Argument(
+            metavar="STUDY",
+            help=STUDY,
+            callback=lambda path: path.parent if path.is_file() else path,
+            default_factory=Path,
+            show_default="here",
+        ),
     ],
     port: Annotated[int, typer.Option(help="port of the page; 0 selects a free one")] = 0,
 ) -> None:

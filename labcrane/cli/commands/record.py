@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from labcrane.cli.options import Local, protocol_in, stay_on_this_computer
+from labcrane.cli.options import Local, data_in, protocol_in, stay_on_this_computer
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError, RecordingError, nearest
 
@@ -192,7 +192,10 @@ def _flows(status: Mapping[str, Any]) -> bool:
 
 
 def recover(
-    folder: Annotated[Path, typer.Argument(help="the study's data folder, or a folder in it")],
+    folder: Annotated[
+        Path,
+        typer.Argument(help="the study's data folder, or a folder in it", callback=data_in),
+    ],
 ) -> None:
     """Rebuild participant files from the journals a crash left."""
     _recover(folder)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from labcrane.cli.commands.approval import today
-from labcrane.cli.options import protocol_in, stay_on_this_computer
+from labcrane.cli.options import StudyData, protocol_in, stay_on_this_computer
 from labcrane.cli.output import out
 from labcrane.errors import LabcraneError, PluginError, ProtocolError, RecordingError
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from labcrane.analysis.movements import Groups
     from labcrane.participants.products import Product
 
-DataFolder = Annotated[Path, typer.Argument(metavar="DATA", help="the study's data folder")]
 Include = Annotated[
     list[str] | None,
     typer.Option(help="also use: simulated, pilot, half-finished; may be repeated"),
@@ -42,7 +41,7 @@ LEFT_OUT = 3
 
 
 def export(
-    data: DataFolder,
+    data: StudyData,
     to: Annotated[
         str,
         typer.Option(
@@ -168,7 +167,7 @@ def _measured(
 
 
 def report(
-    data: DataFolder,
+    data: StudyData,
     folder: Annotated[Path, typer.Option("--out", help="folder for the report")] = Path(
         "labcrane-report"
     ),

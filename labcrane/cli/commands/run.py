@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from labcrane.cli.options import DataBeside, Local, ProtocolPath, data_folder, stay_on_this_computer
+from labcrane.cli.options import DataBeside, Local, ProtocolHere, data_folder, stay_on_this_computer
 from labcrane.cli.output import out
 from labcrane.errors import LabcraneError, PluginError, ProtocolError
 
@@ -39,7 +39,7 @@ RealTime = Annotated[
 
 
 def run(
-    protocol: ProtocolPath,
+    protocol: ProtocolHere,
     participant: Participant,
     session: SessionNumber = 1,
     data: DataBeside = None,
@@ -79,7 +79,7 @@ def run(
 
 
 def resume(
-    protocol: ProtocolPath,
+    protocol: ProtocolHere,
     participant: Participant,
     session: SessionNumber = 1,
     data: DataBeside = None,

@@ -7,6 +7,7 @@ import typer
 
 from labcrane.cli.commands.approval import today
 from labcrane.cli.commands.results import LEFT_OUT, cohort_of
+from labcrane.cli.options import StudyData
 from labcrane.cli.output import out, print_rows
 from labcrane.errors import LabcraneError
 
@@ -17,7 +18,7 @@ HALF_FINISHED = "half-finished"
 
 
 def score(
-    folder: Annotated[Path, typer.Argument(help="the study's data folder")],
+    folder: StudyData,
     into: Annotated[
         Path | None, typer.Option("--out", help="the workbook; FOLDER/evaluation.xlsx by default")
     ] = None,

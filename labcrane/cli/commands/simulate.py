@@ -14,7 +14,7 @@ from labcrane.cli.commands.results import (
     cohort_of,
     progress_bar,
 )
-from labcrane.cli.options import ProtocolPath, stay_on_this_computer
+from labcrane.cli.options import ProtocolHere, stay_on_this_computer
 from labcrane.cli.output import out
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ CohortPath = Annotated[
 
 
 def simulate(
-    protocol: ProtocolPath,
+    protocol: ProtocolHere,
     folder: Annotated[Path, typer.Option("--out", help="the simulated study's data folder")],
     participants: Annotated[
         int | None,
@@ -110,7 +110,7 @@ POOL_TIMES = 5
 
 
 def power(
-    protocol: ProtocolPath,
+    protocol: ProtocolHere,
     folder: Annotated[Path, typer.Option("--out", help="for the pool, the table and the plot")],
     participants: Annotated[str, typer.Option(help="sizes of the cohort")] = "12,24,36,48",
     effect: Annotated[
@@ -485,7 +485,7 @@ def _write_power(folder: Path, found: "Sequence[Power]", by: _Drawn) -> None:
 
 
 def tracks(
-    protocol: ProtocolPath,
+    protocol: ProtocolHere,
     folder: Annotated[Path, typer.Option("--out", help="for the tables and the plot")],
     operators: Annotated[int, typer.Option(help="number of simulated operators", min=20)] = 1000,
     spread: Annotated[
