@@ -21,7 +21,7 @@ def methods(lock: Lock) -> str:
         f"scheme {_use(protocol['scheme'])}",
         f"The simulation ran at {_number(protocol.get('rate_hz', 240))} Hz, and every tick was "
         "recorded",
-        *_tasks(protocol),
+        *_tasks(protocol, _units(lock)),
         *_design(protocol),
         *_sessions(protocol),
         f"The software was labcrane {materials['labcrane']['version']} with the plug-ins "
@@ -51,13 +51,23 @@ def _people(protocol: Mapping[str, Any]) -> list[str]:
     return said
 
 
-def _tasks(protocol: Mapping[str, Any]) -> list[str]:
+def _tasks(protocol: Mapping[str, Any], units: Mapping[str, str]) -> list[str]:
     return [
-        f"Task {name} was {_use(task)} with {_listed(task)}"
+        f"Task {name} was {_use(task)} ({_listed(task, units)})"
         if len(task) > 1
         else f"Task {name} was {_use(task)}"
         for name, task in protocol["tasks"].items()
     ]
+
+
+def _units(lock: Lock) -> dict[str, str]:
+    """Return the units of the columns of trials, which tasks call as the settings that they vary.
+
+    A setting of several, such as ``distances``, has the unit of the column ``distance``.
+    """
+    rows = [row for row in lock.content["codebook"] if row["table"] == "trials"]
+    named = {row["name"]: row["unit"] for row in rows if row["unit"] not in {"", "1"}}
+    return {**{f"{name}s": unit for name, unit in named.items()}, **named}
 
 
 UNITS = {"s": "s", "hz": "Hz", "m": "m", "deg": "degrees"}
@@ -130,16 +140,21 @@ def _use(component: Mapping[str, Any]) -> str:
     return str(component["use"]).replace("_", " ")
 
 
-def _listed(settings: Mapping[str, Any]) -> str:
-    return ", ".join(_setting(name, value) for name, value in settings.items() if name != "use")
+def _listed(settings: Mapping[str, Any], units: Mapping[str, str] | None = None) -> str:
+    said = [_setting(name, value, units or {}) for name, value in settings.items() if name != "use"]
+    return "; ".join(said)
 
 
-def _setting(name: str, value: Any) -> str:
+def _setting(name: str, value: Any, units: Mapping[str, str]) -> str:
     """Return a setting in words; a unit at the end of its name goes behind the value."""
-    words, _, unit = name.rpartition("_")
-    if unit not in UNITS:
-        words, unit = name, ""
-    return f"{words.replace('_', ' ')} {_value(value)}{f' {UNITS[unit]}' if unit else ''}"
+    words, _, ending = name.rpartition("_")
+    unit = UNITS.get(ending, "")
+    if not unit:
+        words, unit = name, units.get(name, "")
+    numbers = value if isinstance(value, list) else [value]
+    if not all(type(number) in {int, float} for number in numbers):
+        unit = ""  # written with its own, or no number
+    return f"{words.replace('_', ' ')}: {_value(value)}{f' {unit}' if unit else ''}"
 
 
 def _value(value: Any) -> str:

@@ -460,7 +460,10 @@ def test_people_and_programs_are_asked_the_same_with_the_line(
     a_study(tmp_path, ("rate_hz: 240", "rate_hz: 10"))
     path = str(tmp_path / "study.yaml")
     assert main(["check", path]) == 0
-    said = capsys.readouterr().err
+    printed = capsys.readouterr()
+    assert printed.err == ""  # a question is a result of a check, as that it is fine
+    said, fine = printed.out.splitlines()
+    assert fine.endswith("; 1 question is asked above")
     assert said.startswith(f"{path}:4:10: question: rate_hz is 10 Hz, at which")
     assert "(if it is, write expected: [rate_hz])" in said
     assert main(["check", path, "--json"]) == 0

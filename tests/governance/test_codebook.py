@@ -76,7 +76,7 @@ def test_the_methods_paragraph_says_what_was_approved_and_done(tmp_path: Path) -
         "3 groups (none, visual, sound) in permuted blocks of 3",
         "CH8 knuckle boom",
         "at 240 Hz",
-        "distances 2 and 3, movements 1, limit 20 s",
+        "aiming (distances: 2 and 3 m; movements: 1; limit: 20 s)",
         "The levels of pairs came in randomised blocks, 3 times each, no more than 1 in a row",
         "Session 1 (only), 0 to 3 days after the one before, consisted of consent, block aiming",
         f"labcrane {labcrane.__version__}",
@@ -165,6 +165,20 @@ def test_the_balance_of_36_participants_is_checked_and_exported(
             plan.group, plan.seed, plan.slot,
         )  # fmt: skip
         assert tuple(row["order"].split()) == plan.blocks[0].levels["pairs"]
+
+
+def test_the_balance_of_a_few_is_that_of_all_who_are_planned(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "study.yaml"
+    planned = ordered("williams").replace("title:", "participants: {planned: 36}\ntitle:")
+    path.write_text(planned, encoding="utf-8")
+    assert main(["plan", str(path), "--participants", "1"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "P001: slot 1" in said
+    assert "P002" not in said
+    assert "of all 36 planned: balanced: groups of equal size: none 12, visual 12" in said
+    assert "not balanced" not in said
 
 
 def labcrane_study(path: Path):

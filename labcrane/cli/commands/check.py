@@ -73,9 +73,11 @@ def check(
         typer.echo(json.dumps(fine))
         return
     for each in told:
-        typer.echo(each["whole"], err=True)
+        typer.echo(each["whole"])
     sessions = len(study.protocol.sessions)
     done = ", and was rehearsed" if rehearse else ""
+    if told:
+        done += f"; {len(told)} question{'s are' if len(told) > 1 else ' is'} asked above"
     # One plain line, for which rich is not worth loading.
     typer.echo(
         f"{protocol}: study {study.protocol.study!r} is fine: {sessions} "
@@ -162,8 +164,15 @@ def plan(
     for session in plans:
         _print(session)
     if not participant:
+        planned, whose = study.protocol.participants.planned, ""
+        if count < planned:  # what a few of them have says nothing of the design
+            everyone = pseudonyms(study.protocol.participants.pattern, planned)
+            allotments, whose = (
+                allocate(study, dict.fromkeys(everyone)),
+                f"of all {planned} planned: ",
+            )
         for line in balance(study, allotments):
-            out.print(line, markup=False)
+            out.print(f"{whose}{line}", markup=False)
     if export:
         out.print(f"allocation: {export}", markup=False)
 

@@ -39,7 +39,11 @@ def participants(study: StudyOrHere = None, data: DataOrHere = None) -> None:
             f"{entry.slot}{'' if entry.holds_slot else ' (free)'}",
             entry.group or "-",
             str(entry.seed),
-            ", ".join(f"{consent.version} {consent.date}" for consent in entry.consent) or "-",
+            ", ".join(
+                f"{consent.file} (version {consent.version}) {consent.date}"
+                for consent in entry.consent
+            )
+            or "-",
             ", ".join(
                 f"{sitting.session} {sitting.date} {_ended(places, name, sitting.session)}"
                 for sitting in entry.sessions
