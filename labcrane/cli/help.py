@@ -79,6 +79,7 @@ def plain(text: str) -> str:
 
     ``{PROTOCOL}`` becomes ``PROTOCOL``, and ``--wait <float range>`` becomes ``--wait NUMBER``.
     """
+    text = text.replace("[STUDY]...", "[STUDY]")  # declared so, to stand before what must be given
     text = PLACE.sub(lambda found: found["name"].upper(), text)
     before, title, rest = text.partition("Arguments:\n")
     if title:

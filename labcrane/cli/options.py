@@ -1,5 +1,6 @@
 """Arguments and options that several commands take."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,11 @@ STUDY = "the study: its folder, its protocol or its data folder"
 
 
 def protocol_in(path: Path | None) -> Path | None:
+    """Return a study's file where a study was given, as of :func:`protocol_of`."""
+    return None if path is None else protocol_of(path)
+
+
+def protocol_of(path: Path) -> Path:
     """Return a study's file where its folder was given, or the data folder in it.
 
     Raises
@@ -22,7 +28,7 @@ def protocol_in(path: Path | None) -> Path | None:
     ProtocolError
         A folder was given, and there is none in it.
     """
-    if path is None or not path.is_dir():
+    if not path.is_dir():
         return path
     if (inside := path / PROTOCOL_FILE).is_file():
         return inside
@@ -96,6 +102,11 @@ StudyData = Annotated[
         show_default="here",
     ),
 ]
+StudyFirst = Annotated[
+    list[Path],
+    # Of several arguments click gives those that must be there the last words, and this the rest.
+    typer.Argument(metavar="STUDY", help=STUDY, default_factory=list, show_default="here"),
+]
 StudyOrHere = Annotated[
     Path | None,
     typer.Argument(metavar="STUDY", help=STUDY, callback=data_in, show_default="here"),
@@ -112,6 +123,25 @@ DataBeside = Annotated[
 def data_folder(data: Path | None, protocol: Path | None) -> Path:
     """Return the given data folder, or the one in the protocol's folder, or data/ here."""
     return data or (protocol.parent if protocol else Path()) / DATA
+
+
+def first_study(words: Sequence[Path]) -> Path | None:
+    """Return the study that stands before the other arguments, if one does.
+
+    Raises
+    ------
+    ProtocolError
+        It is more than one word, or nothing of that name is there.
+    """
+    if not words:
+        return None
+    if len(words) > 1 or not words[0].exists():
+        said = " ".join(map(str, words))
+        raise ProtocolError(
+            f"{said!r} stands where a study does, and there is none; give one study, by its "
+            "folder, its protocol or its data folder, and words with blanks in quotes"
+        )
+    return words[0]
 
 
 Local = Annotated[bool, typer.Option("--local", help="keep LSL streams on this computer")]

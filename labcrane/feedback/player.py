@@ -46,7 +46,7 @@ def play(study: Study, frames: Sequence[Frame], scene: str, say: Callable[[str],
     orders = [replace(order, recorded=False) for order in host_orders(study, run, source)]
     handles = [FeedbackHandle(order, "continue") for order in orders]
     try:
-        wait_for_all(handles, say, "--to FOLDER writes files instead")
+        wait_for_all(handles, say, "--out FOLDER writes files instead")
         _present(run, source, frames, scene, [*study.cues, *study.sounds], handles)
     finally:
         for handle in handles:

@@ -100,4 +100,4 @@ def test_where_nothing_can_be_shown_it_says_so(tmp_path: Path) -> None:
     )
     assert done.returncode == 1
     assert "nothing can draw here: neither OpenGL nor the software renderer" in done.stdout
-    assert "nothing can be shown or sounded here; --to FOLDER writes files instead" in done.stderr
+    assert "nothing can be shown or sounded here; --out FOLDER writes files instead" in done.stderr

@@ -214,6 +214,17 @@ def test_a_device_that_no_plugin_can_look_at_is_named(tmp_path: Path) -> None:
     assert line.startswith("input simulated_operator: plugin 'operator' has no examine")
 
 
+def test_the_doctor_takes_a_study_as_argument_or_option_and_not_as_both(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "protocol.yaml").write_text(SHORT)
+    folder = str(tmp_path)
+    assert main(["doctor", folder, "--protocol", folder]) == 2
+    assert "the study was given twice" in " ".join(capsys.readouterr().err.split())
+    assert main(["doctor", folder, "--display"]) == 0
+    assert "protocol.yaml has no views" in " ".join(capsys.readouterr().out.split())
+
+
 @pytest.mark.slow
 def test_the_command_says_all_as_json_and_keeps_it_for_the_record(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]

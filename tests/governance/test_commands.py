@@ -234,3 +234,26 @@ def test_a_study_that_is_given_twice_is_refused(
 ) -> None:
     words = ("participants", str(tmp_path), "--data", str(tmp_path))
     assert "was given twice" in say(capsys, *words, status=2)
+
+
+def test_a_study_stands_before_a_participant_too(
+    study: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("study.yaml").rename("protocol.yaml")
+    say(
+        capsys, "approve", "--board", "B", "--reference", "R",
+        "--valid-until", f"{TODAY.year + 1}-12-31", "--consent", "consent.txt",
+    )  # fmt: skip
+    assert "P001 has consented" in say(capsys, "consent", "P001")
+    monkeypatch.chdir(study.parent)
+    assert "P002 has consented" in say(capsys, "consent", study.name, "P002")
+    say(capsys, "note", study.name, "P001", "left-handed")
+    say(capsys, "exclude", f"{study.name}/data", "P001", "--reason", "dropped out")
+    assert "register" in say(capsys, "where", f"{study.name}/protocol.yaml", "P001")
+    said = say(capsys, "participants", study.name)
+    assert "P001: left-handed" in said
+    assert "dropped out" in said
+    say(capsys, "erase", study.name, "P001", "--reason", "withdrew", "--yes")
+    assert "P001 erased" in say(capsys, "participants", study.name)
+    said = say(capsys, "note", "P002", "two", "words", status=2)
+    assert "'P002' stands where a study does, and there is none" in said

@@ -8,7 +8,7 @@ import typer
 
 from labcrane.cli.commands.approval import today
 from labcrane.cli.commands.participants import Reason, Someone
-from labcrane.cli.options import DataOrHere, one_study
+from labcrane.cli.options import DataOrHere, StudyFirst, data_in, first_study, one_study
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from labcrane.participants.inventory import InventoryEntry
 
 
-def where(participant: Someone, data: DataOrHere = None) -> None:
+def where(study: StudyFirst, participant: Someone, data: DataOrHere = None) -> None:
     """List every place that holds a participant's data."""
     from labcrane.participants.folders import Places
     from labcrane.participants.inventory import inventory
 
-    places = Places(one_study(data))
+    places = Places(one_study(data, data_in(first_study(study))))
     found = inventory(places, participant)
     if not found:
         out.print(
@@ -36,6 +36,7 @@ def where(participant: Someone, data: DataOrHere = None) -> None:
 
 
 def erase(
+    study: StudyFirst,
     participant: Someone,
     reason: Reason,
     yes: Annotated[bool, typer.Option("--yes", help="do not ask; for scripts")] = False,
@@ -46,7 +47,7 @@ def erase(
     from labcrane.participants.erasure import BEYOND
     from labcrane.participants.folders import Places
 
-    places = Places(one_study(data))
+    places = Places(one_study(data, data_in(first_study(study))))
     if not yes:
         _confirm_erasure(places, participant)
     done = unfinished.erase(places, participant, reason, today())
@@ -88,6 +89,7 @@ def _list(found: "Sequence[InventoryEntry]") -> None:
 
 
 def relabel(
+    study: StudyFirst,
     participant: Someone,
     to: Annotated[str, typer.Argument(help="the correct pseudonym")],
     reason: Reason = "wrong number entered",
@@ -97,11 +99,16 @@ def relabel(
     from labcrane.participants import recovery as unfinished
     from labcrane.participants.folders import Places
 
-    _say(unfinished.correct(Places(one_study(data)), participant, to, reason, today()))
+    _say(
+        unfinished.correct(
+            Places(one_study(data, data_in(first_study(study)))), participant, to, reason, today()
+        )
+    )
     out.print(f"{participant} is {to} now; labcrane deviations says how it was run", markup=False)
 
 
 def transfer(
+    study: StudyFirst,
     to: Annotated[Path, typer.Argument(help="folder of the lab's storage")],
     data: DataOrHere = None,
 ) -> None:
@@ -109,7 +116,7 @@ def transfer(
     from labcrane.participants import recovery as unfinished
     from labcrane.participants.folders import Places
 
-    done = unfinished.move(Places(one_study(data)), to)
+    done = unfinished.move(Places(one_study(data, data_in(first_study(study)))), to)
     out.print(
         f"{len(done.copied)} files copied; {done.equal} files are equal on both sides (SHA-256)"
     )

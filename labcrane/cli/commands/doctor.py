@@ -11,6 +11,7 @@ import typer
 
 from labcrane.cli.commands.delay import measure_audio, measure_display
 from labcrane.cli.options import (
+    STUDY,
     DataBeside,
     Local,
     data_folder,
@@ -32,6 +33,15 @@ MOST_LINES = 60
 
 
 def doctor(
+    study: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="STUDY",
+            help=f"as --protocol: {STUDY}",
+            callback=protocol_in,
+            show_default=False,
+        ),
+    ] = None,
     protocol: Annotated[
         Path | None,
         typer.Option(help="check only what this study needs", callback=protocol_in),
@@ -61,6 +71,11 @@ def doctor(
     local: Local = False,
 ) -> None:
     """Check this computer before a study day, with a remedy for each problem."""
+    if study is not None and protocol is not None:
+        raise ProtocolError(
+            f"the study was given twice, as {study} and as --protocol {protocol}; give it once"
+        )
+    protocol = study or protocol
     if local:
         stay_on_this_computer()
     if display or audio:

@@ -18,7 +18,9 @@ def preview(
     protocol: ProtocolHere,
     folder: Annotated[
         Path | None,
-        typer.Option("--to", help="write PNG and WAV files to this folder instead of showing them"),
+        typer.Option(
+            "--out", "--to", help="write PNG and WAV files to this folder instead of showing them"
+        ),
     ] = None,
     recording: Annotated[
         Path | None,

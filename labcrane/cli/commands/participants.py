@@ -10,10 +10,13 @@ from labcrane.cli.options import (
     STUDY,
     DataBeside,
     DataOrHere,
-    ProtocolPath,
+    StudyFirst,
     StudyOrHere,
     data_folder,
+    data_in,
+    first_study,
     one_study,
+    protocol_of,
     stay_on_this_computer,
 )
 from labcrane.cli.output import out, print_rows, whole_table
@@ -83,7 +86,7 @@ def _ended(places: "Places", participant: str, session: int) -> str:
 
 
 def consent(
-    protocol: ProtocolPath,
+    study: StudyFirst,
     participant: Someone,
     beyond_planned: Annotated[
         bool,
@@ -99,14 +102,15 @@ def consent(
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
 
+    protocol = protocol_of(first_study(study) or Path())
     registry = discover(study=protocol)
-    study = load(protocol, registry)
-    lock = verify(study, registry, today())
+    loaded = load(protocol, registry)
+    lock = verify(loaded, registry, today())
     text = (lock.approval["consent"], lock.consent_version)
     places = Places(data_folder(data, protocol))
     lock.check_before(read(places).locks)
     entry = confirm_consent(
-        places, study, participant, text, today(), beyond_planned=beyond_planned
+        places, loaded, participant, text, today(), beyond_planned=beyond_planned
     )
     group = f", group {entry.group}" if entry.group else ""
     out.print(
@@ -117,6 +121,7 @@ def consent(
 
 
 def exclude(
+    study: StudyFirst,
     participant: Someone,
     reason: Reason,
     keep_slot: Annotated[
@@ -128,11 +133,18 @@ def exclude(
     from labcrane.participants import enrolment
     from labcrane.participants.folders import Places
 
-    enrolment.exclude(Places(one_study(data)), participant, reason, today(), keep_slot=keep_slot)
+    enrolment.exclude(
+        Places(one_study(data, data_in(first_study(study)))),
+        participant,
+        reason,
+        today(),
+        keep_slot=keep_slot,
+    )
     out.print(f"{participant} is excluded", markup=False)
 
 
 def note(
+    study: StudyFirst,
     participant: Someone,
     text: Annotated[str, typer.Argument(help="the note; no names")],
     data: DataOrHere = None,
@@ -141,10 +153,11 @@ def note(
     from labcrane.participants import enrolment
     from labcrane.participants.folders import Places
 
-    enrolment.note(Places(one_study(data)), participant, text)
+    enrolment.note(Places(one_study(data, data_in(first_study(study)))), participant, text)
 
 
 def waive(
+    study: StudyFirst,
     participant: Someone,
     reason: Reason,
     session: Annotated[int, typer.Option(help="which session", min=2)],
@@ -154,7 +167,9 @@ def waive(
     from labcrane.participants import enrolment
     from labcrane.participants.folders import Places
 
-    enrolment.waive(Places(one_study(data)), participant, session, reason, today())
+    enrolment.waive(
+        Places(one_study(data, data_in(first_study(study)))), participant, session, reason, today()
+    )
 
 
 def deviations(study: StudyOrHere = None, data: DataOrHere = None) -> None:
