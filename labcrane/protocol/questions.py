@@ -837,7 +837,7 @@ def _of_orders(study: Study) -> Doubts:
             ("design", "order", factor),
             f"design has no order for {factor} of {of}, so they come as written, in one order for "
             "everybody, and their effect cannot be distinguished from learning; write order: "
-            f"{{{factor}: shuffled}} under design, or as_written",
+            f"{{{factor}: shuffled}} under design",
         )
 
 

@@ -454,6 +454,13 @@ def test_an_answer_to_nothing_is_told_with_the_nearest_question(tmp_path: Path) 
     )
 
 
+def test_a_question_says_once_how_it_is_answered_that_it_is_meant(tmp_path: Path) -> None:
+    study = a_study(tmp_path, (", pairs: 1", ""))
+    (asked,) = (each for each in questions(study) if each.key == "design.order.pairs")
+    assert asked.whole.count("as_written") == 0
+    assert asked.whole.endswith("is that meant? (if it is, write expected: [design.order.pairs])")
+
+
 def test_people_and_programs_are_asked_the_same_with_the_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -88,7 +88,9 @@ def test_a_file_given_as_data_folder_is_refused(
 
 def test_nobody_to_use_names_what_would_help(data: Path, tmp_path: Path) -> None:
     shutil.copytree(data / "P007", tmp_path / "P007")
-    with pytest.raises(RecordingError, match=r"resume continues it.*labcrane recover .*P007 builds") as refused:
+    with pytest.raises(
+        RecordingError, match=r"resume continues it.*labcrane recover .*P007 builds"
+    ) as refused:
         find_cohort(tmp_path)
     assert "--include" not in str(refused.value)
     shutil.copytree(data / "P003", tmp_path / "P003")

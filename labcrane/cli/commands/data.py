@@ -28,9 +28,7 @@ def where(study: StudyFirst, participant: Someone, data: DataOrHere = None) -> N
     places = Places(one_study(data, data_in(first_study(study))))
     found = inventory(places, participant)
     if not found:
-        out.print(
-            f"{places.root} and its register contain no data of {participant}", markup=False
-        )
+        out.print(f"{places.root} and its register contain no data of {participant}", markup=False)
         return
     _list(found)
 
