@@ -113,7 +113,7 @@ _ORDINARY = frozenset(
         "protocols", "studies", "study", "tmp", "users", "usr", "var", "work",
     ]
 )  # fmt: skip
-"""Names of folders, users and computers that say nothing of a person."""
+"""Names of folders, users and computers that identify no person."""
 
 _SHORT = 4
 """Users and computers with fewer letters are replaced as whole words: others hold them by chance.
@@ -271,7 +271,7 @@ def people_of(folder: Path) -> set[str]:
     Raises
     ------
     RecordingError
-        Its register cannot be read, so that nobody knows whose names have to be replaced.
+        Its register cannot be read, so the pseudonyms to be replaced are unknown.
     """
     names = set()
     for root in (folder, folder.absolute().parent):

@@ -163,7 +163,7 @@ class Terminal:
             waits = standing.paused or standing.stage in AWAITING
             waited = waited + LOOK_S if waits else 0.0
         self.say(
-            "the standard input has ended and there is no page, so that nobody can give orders: "
+            "the standard input has ended and there is no page, so no action can be given: "
             "the session ends"
         )
         self._console.give(Command(Order.END))

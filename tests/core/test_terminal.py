@@ -164,7 +164,7 @@ def test_without_terminal_and_page_a_session_ends_where_it_waits(
             time.sleep(0.5)
             given += console.commands()
     assert given == ([Command(Order.END)] if alone else [])
-    assert ("there is no page, so that nobody can give orders" in printed.getvalue()) == alone
+    assert ("there is no page, so no action can be given" in printed.getvalue()) == alone
 
 
 @pytest.mark.slow

@@ -165,7 +165,7 @@ def plan(
         _print(session)
     if not participant:
         planned, whose = study.protocol.participants.planned, ""
-        if count < planned:  # what a few of them have says nothing of the design
+        if count < planned:  # a few of them do not show the balance
             everyone = pseudonyms(study.protocol.participants.pattern, planned)
             allotments, whose = (
                 allocate(study, dict.fromkeys(everyone)),
