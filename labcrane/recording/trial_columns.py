@@ -1,8 +1,12 @@
 """Columns of the trial table, their units and their definitions."""
 
+from typing import TYPE_CHECKING
+
 from labcrane.core.records import Phase
-from labcrane.core.roles import Task
 from labcrane.core.signals import Signal
+
+if TYPE_CHECKING:
+    from labcrane.core.roles import Task
 
 ENDS = tuple(str(phase) for phase in Phase if phase.over)
 
@@ -50,7 +54,7 @@ OWN = (
 """Columns that a session may put into its trial table."""
 
 
-def trial_units(task: Task) -> dict[str, str]:
+def trial_units(task: "Task") -> dict[str, str]:
     """Return the unit of every numeric column that ``task`` and the session put into a row."""
     return {
         column: signal.unit
@@ -60,7 +64,7 @@ def trial_units(task: Task) -> dict[str, str]:
     }
 
 
-def trial_definitions(task: Task) -> dict[str, str]:
+def trial_definitions(task: "Task") -> dict[str, str]:
     """Return the definition of each column of the session and of ``task``."""
     return {
         column: signal.definition
