@@ -286,8 +286,7 @@ def encode(message: Message) -> bytes:
     if len(line) > MOST_BYTES:
         what = message.order if isinstance(message, Command) else message.kind
         raise MessageError(
-            f"{what}: {len(line):,} bytes, and a session takes {MOST_BYTES:,} at most; "
-            "say it shorter"
+            f"{what}: {len(line):,} bytes, but a session accepts at most {MOST_BYTES:,}; shorten it"
         )
     return line
 
@@ -303,7 +302,7 @@ def decode(line: bytes) -> Message:
     try:
         return MESSAGE.validate_json(line)
     except ValidationError as error:
-        raise MessageError(f"{len(line)} bytes that are no message to a session") from error
+        raise MessageError(f"{len(line)} bytes that are not a message to a session") from error
 
 
 def given_by(command: Command) -> str:

@@ -49,7 +49,7 @@ class FeedbackSettings:
             value = parse_yaml(written, "a setting")
         except ProtocolError:
             raise ValueError(
-                f"{written!r} cannot be read as a value; write a number, a word, true or false"
+                f"{written!r} is not a value; write a number, a word, true or false"
             ) from None
         if not isinstance(value, float | int | str | bool | None):
             message = f"{name}.{key} can be changed to a single value, not {written!r}"

@@ -85,7 +85,7 @@ class QuestionnaireForm:
             answer = item.check(value)
             if isinstance(answer, str) and (found := personal(answer)):
                 # What names a person must not be in the record, not even as a refused answer.
-                why = f"an answer must not hold {found}; write it without"
+                why = f"an answer must not contain {found}; remove it"
                 return REFUSED, {**data, "given": "", "item": item.name, "why": why}
         except LimitError as error:
             # Nor what no page could show.
@@ -153,7 +153,7 @@ class QuestionnaireForm:
             or "value" not in given
         ):
             raise AnswerError(
-                f"an answer says questionnaire {name!r}, item and value, not {given!r}"
+                f"an answer needs questionnaire {name!r}, item and value, not {given!r}"
             )
         item = self._items.get(str(given.get("item")))
         if item is None:

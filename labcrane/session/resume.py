@@ -256,7 +256,7 @@ def progress(journal: Path, joints: Sequence[str]) -> Progress:
     found = parts(journal)
     if not found:
         raise ProtocolError(
-            f"there is no journal {journal}, so there is no session to go on with; start one with "
+            f"there is no journal {journal}, and so no session to continue; start one with "
             "labcrane run"
         )
     log, _ = read_journal(found)
@@ -267,9 +267,9 @@ def progress(journal: Path, joints: Sequence[str]) -> Progress:
             so_far.take(event.name, event.data, closes=closes)
         except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
             raise RecordingError(
-                f"{journal}: event {event.name!r} at {event.time:.3f} s does not say what such an "
-                f"event says ({error!r}), so what the session owes is not known; "
-                f"labcrane recover {journal.parent} saves what was recorded"
+                f"{journal}: event {event.name!r} at {event.time:.3f} s lacks a value "
+                f"that it needs ({error!r}), so the remaining trials are unknown; "
+                f"use labcrane recover {journal.parent} to save the recorded data"
             ) from error
     return so_far
 
@@ -317,9 +317,9 @@ def check_recorded(plan: SessionPlan, so_far: Progress) -> None:
             was = ", ".join(f"{name} {said.get(name)!r}" for name in wrong) or "recorded"
             has = ", ".join(f"{name} {about[name]!r}" for name in wrong) or "no such trial"
             raise ProtocolError(
-                f"the session was begun by another plan: trial {number} was {was}, and the plan "
-                f"has {has}; go on with the protocol, and the place in the design, with which it "
-                "was begun"
+                f"the session was begun with another plan: trial {number} was {was}, and the plan "
+                f"has {has}; continue with the protocol, and the place in the design, with which "
+                "it was begun"
             )
 
 

@@ -402,7 +402,7 @@ class Sequencer:
             case ConsentGiven():
                 return "consent is given before the session begins"
             case Remark(order, text) if found := personal(text):
-                return f"a {order} must not hold {found}; write it without"
+                return f"a {order} must not contain {found}; remove it"
             case SettingChange():
                 return self._settings.refusal(request)
             case Malformed(why=why):

@@ -237,7 +237,7 @@ def _record(
         except (PluginError, DeviceError) as error:
             log.note(Event("session.failed", clock.now(), {"why": str(error)}))
             error.add_note(
-                "what was recorded until then is in the participant file; go on with: "
+                "the data recorded until then are in the participant file; to continue, run: "
                 f"{visit.resume_command}"
             )
             raise
@@ -331,15 +331,15 @@ def go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:
         return so_far, left
     if so_far.called_complete and not remaining(visit.study, whole, so_far, "redo_trial").steps:
         raise ProtocolError(
-            f"session {visit.session} of {visit.folder.name} ran to its end, so there is nothing "
-            "to go on with; labcrane recover makes its participant file"
+            f"session {visit.session} of {visit.folder.name} is complete, so there is nothing "
+            "to continue; labcrane recover writes its participant file"
         )
     if so_far.stop == INCOMPLETE:
         left = remaining(visit.study, whole, so_far, "redo_trial")
         given_up = owed_text(left, TrialCounts.of(whole))
         raise ProtocolError(
-            f"session {visit.session} of {visit.folder.name} owes nothing that policy "
-            f"{policy_of(visit)!r} would repeat; it gave up {given_up}; to repeat that, give "
+            f"nothing remains in session {visit.session} of {visit.folder.name} under policy "
+            f"{policy_of(visit)!r}; abandoned: {given_up}; to repeat them, use "
             "--policy redo_trial"
         )
     return so_far, left  # all is done, and only its end is still to be said
@@ -378,7 +378,7 @@ def outlook(visit: Visit, admission: Admission) -> Outlook:
     again = repeats(left, so_far)
     lines = [
         f"session {visit.session} of {visit.folder.name} stopped: {so_far.stop}",
-        f"left to do: {owed_text(left, counts) or 'nothing but its end'}",
+        f"left to do: {owed_text(left, counts) or 'nothing except the end of the session'}",
         f"repeated, as new attempts ({policy_of(visit)}): "
         f"{counts.names(again) if again else 'nothing'}",
     ]

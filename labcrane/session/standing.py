@@ -150,7 +150,11 @@ def why_not(order: Order, standing: Standing) -> str | None:
             stage not in {SessionStage.WAITING, SessionStage.JUDGEMENT} and not standing.paused
         ):
             awaited = ", ".join(sorted(standing.awaited))
-            return f"feedback {awaited} is awaited" if awaited else "nothing waits to start"
+            return (
+                f"the session is waiting for feedback {awaited}"
+                if awaited
+                else "nothing is waiting to start"
+            )
         case Order.PAUSE if EXAMINER in standing.holds:
             return "the session is paused already"
         case Order.SKIP if stage not in SKIPPABLE:
@@ -158,5 +162,5 @@ def why_not(order: Order, standing: Standing) -> str | None:
         case Order.REPEAT | Order.REPORT if not standing.trial:
             return NO_TRIAL
         case Order.OVERRIDE | Order.COMPLETION if not (standing.trial or standing.last):
-            return "no trial is running, and none has ended"
+            return "no trial is running or has ended"
     return None

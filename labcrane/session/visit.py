@@ -133,21 +133,23 @@ def check_new(visit: Visit) -> None:
     if not so_far.called_complete:
         again = " --policy redo_trial" if so_far.stop == INCOMPLETE else ""
         raise ProtocolError(
-            f"participant {folder.name} has begun session {visit.session} (recorded in "
-            f"{folder.path}), and it did not come to its end: {so_far.stop}; go on with: "
+            f"participant {folder.name} has an unfinished session {visit.session} (in "
+            f"{folder.path}): {so_far.stop}; to continue, run: "
             f"{visit.resume_command}{again}"
         )
     sessions = enumerate(visit.study.protocol.sessions, start=1)
     rest = [(number, each.name) for number, each in sessions if number not in begun]
     left = [f"--session {number} ({name!r})" for number, name in rest]
     others = (
-        f", or give the one that is next: {left[0]}"
+        f", or use the next one: {left[0]}"
         if left
-        else "; no session of the study is left: take another --participant"
+        else "; the study has no further session: use another --participant"
     )
-    pilot = "; for a pilot any other --participant will do" if visit.pilot and left else ""
+    pilot = (
+        "; for a pilot session, any other --participant is possible" if visit.pilot and left else ""
+    )
     raise ProtocolError(
-        f"participant {folder.name} has already run session {visit.session} to its end (recorded "
+        f"participant {folder.name} has already completed session {visit.session} (recorded "
         f"in {folder.path}: {', '.join(map(str, begun))}); check the number{others}{pilot}"
     )
 

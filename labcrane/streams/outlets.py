@@ -166,7 +166,7 @@ def _check_stamp(stamp: float) -> None:
     """Refuse what liblsl would replace by the time of the push: 0 means now, -1 means deduce."""
     if not stamp > 0.0:
         raise StreamError(
-            f"a sample cannot be stamped {stamp} s; LSL needs the computer's own time, above 0"
+            f"a sample cannot have the timestamp {stamp} s; LSL needs the computer's time, above 0"
         )
 
 

@@ -68,7 +68,7 @@ class StreamRequest:
     def __post_init__(self) -> None:
         if self.type is None and self.name is None and self.source_id is None:
             raise StreamError(
-                f"stream {self.label!r} could be any: give its type, name or source_id"
+                f"stream {self.label!r} matches every stream: give its type, name or source_id"
             )
 
     @classmethod
@@ -111,7 +111,7 @@ class StreamRequest:
         if not self.by_type_alone or self.several:
             return None
         return (
-            f"is asked for by type {self.type!r} alone, and was confirmed: it is {name!r} "
+            f"is requested by type {self.type!r} only, and was confirmed: it is {name!r} "
             f"(source_id {source_id!r}) of {host}"
         )
 
@@ -119,7 +119,7 @@ class StreamRequest:
         """Say in which way a stream is not what was expected."""
         found = []
         if self.channels is not None and channels != self.channels:
-            found.append(f"has {channels} channels, {self.channels} are expected")
+            found.append(f"has {channels} channels; {self.channels} are expected")
         if self.rate_hz is not None and abs(rate_hz - self.rate_hz) > 0.01 * self.rate_hz:
             found.append(f"has a nominal rate of {rate_hz:g} Hz, {self.rate_hz:g} Hz are expected")
         return found
@@ -145,10 +145,12 @@ def same_type(wanted: str, actual: str) -> bool:
 def unstable_id(source_id: str) -> str | None:
     """Say why a stream could not be found again after a restart; None when it could."""
     if not source_id:
-        return "has no source_id, so it is not found again when it restarts: set one in its program"
+        return (
+            "has no source_id, so it cannot be found again after a restart: set one in its program"
+        )
     if RANDOM_ID.fullmatch(source_id):
         return (
-            f"has source_id {source_id}, which looks made up by pylsl and changes at every start: "
+            f"has source_id {source_id}, probably made up by pylsl and new at every start: "
             "set one in its program"
         )
     return None

@@ -179,7 +179,7 @@ class Triggers:
             return
         line.second, line.strays = int(now), STRAYS
         if line.left_out:
-            why = f"{line.name} sent {line.left_out} codes that nobody asked for; they are left out"
+            why = f"{line.name} sent {line.left_out} unexpected codes; they are left out"
             line.left_out = 0
             self._tell(self._write(FLOOD, now, line, {"why": why}))
 

@@ -32,7 +32,7 @@ class ExaminationContract:
             )
             if finding.verdict is not Verdict.PASS:
                 assert finding.advice, (
-                    f"{where} says {finding.text!r}, and nobody is told what to do about it; give "
+                    f"{where} reports {finding.text!r} without advice on what to do about it; give "
                     "the Finding an advice"
                 )
             for name, text in (("text", finding.text), ("advice", finding.advice)):

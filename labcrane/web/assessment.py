@@ -120,10 +120,10 @@ class Assessment:
         running: bool,
     ) -> str:
         if self._about.get("practice") or self._about.get("reference"):
-            return "no indicator: this is no test"
+            return "no indicator: this is not a test"
         if not math.isfinite(reference):
-            return "no indicator: no reference time of this scenario"
-        # A test that runs is taken for one that will be completed.
+            return "no indicator: this scenario has no reference time"
+        # A running test is assumed to be completed in the end.
         outcome = "success" if self._row is None else str(self._row["outcome"])
         completed, why = completion(
             {"completion": self._flag, "outcome": outcome},

@@ -14,18 +14,18 @@ from labcrane.web.scene import SceneView
 RATE_S = 0.25
 
 KEYS: tuple[tuple[str, str], ...] = (
-    ("Space", "start what waits, or go on after a pause"),
+    ("Space", "start the next step, or continue after a pause"),
     ("P", "pause"),
     ("R", "repeat the running trial as a new attempt"),
     ("S", "skip the running trial, break or questionnaire"),
     ("E", "end the session"),
     ("N", "write a note"),
-    ("O", "override: let the trial go on past its automatic ends"),
+    ("O", "override: let the trial continue past its automatic end"),
     ("C", "the trial was completed"),
     ("X", "the trial was not completed"),
     ("H", "write a hint to the operator"),
     ("F", "change a setting of a cue or sound"),
-    ("T", "say which stream is meant, where that is asked"),
+    ("T", "choose a stream, where a choice is needed"),
     ("Q", "fill in the questionnaire"),
     ("D", "dark or light"),
     ("?", "show these keys"),

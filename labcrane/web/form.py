@@ -280,7 +280,7 @@ def _number(text: str) -> float | str:
 
 
 SIGNED = "The participant has signed this text"
-"""What the supervisor confirms."""
+"""What the experimenter confirms."""
 
 
 class ConsentCard:

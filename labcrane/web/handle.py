@@ -102,8 +102,8 @@ class PageHandle:
         try:
             self._over.wait(LAST_LOOK_S)
             if self._open():
-                self._say("the supervisor's page shows what was saved until it is closed; "
-                          "Ctrl-C closes it from here")  # fmt: skip
+                self._say("the experimenter's page shows what was saved until you close it; "
+                          "press Ctrl-C to close it from here")  # fmt: skip
             while self._open():
                 self._over.wait(LOOK_S)
         except KeyboardInterrupt:
@@ -123,7 +123,7 @@ class PageHandle:
         while not self._over.wait(LOOK_S):
             if self._process.exit_code is not None and not self._restart():
                 self._given_up = True
-                self._say("the page keeps dying; the run goes on without it")
+                self._say("the page keeps crashing; the session continues without it")
                 return
             if not self._process.waiting:  # the newest status, when all before it has gone
                 self._status = self._streams() or self._status
@@ -135,9 +135,9 @@ class PageHandle:
                 return False
             for event in self._told:
                 self._process.tell(event)
-        if self._browsers:  # whoever still looks comes again, and nobody else is waited for
+        if self._browsers:  # only browsers that still show it reconnect
             self._browsers, self._left_at = 0, time.monotonic()
-        self._say("the page died and is started again")
+        self._say("the page crashed and was restarted")
         return True
 
     def _take(self, message: Command | Served | Used | Opened | Closed) -> None:

@@ -82,7 +82,7 @@ class PageContext:
         if order not in RIGHTS[page]:
             why: str | None = "no right to order it"
         elif not self.buckets[page].take():
-            why = f"more than {MOST_ORDERS_S} orders a second"
+            why = f"more than {MOST_ORDERS_S} actions per second"
         else:
             why = beyond_limits(command)
         if why is None:

@@ -19,24 +19,24 @@ RATES = 60
 
 STARTING, BETWEEN = "starting", "between steps"
 SAID = {
-    "consent.needed": "waits for the participant's consent",
+    "consent.needed": "waiting for the participant's consent",
     "consent.given": STARTING,
-    "waiting": "waits to start: {what}",
+    "waiting": "ready to start: {what}",
     "trial.start": "trial",
-    "judgement.awaited": "the test has ended: say whether it is completed, or override its end, "
-    "and go on; without a word it counts as it ended",
+    "judgement.awaited": "the test has ended: mark it completed or not, or override its end, "
+    "then continue; otherwise its outcome stays as it is",
     "break.start": "break of {seconds} s",
-    "fixation.shown": "eye tracker's check: point {point}",
+    "fixation.shown": "eye tracker check: point {point}",
     "questionnaire.start": "questionnaire: {title}",
     "session.end": "ended: {reason}",
     **dict.fromkeys(
         ("step.end", "questionnaire.end", "break.end", "fixation.over", "judgement.over"), BETWEEN
     ),
 }
-"""What is said of where the session stands after an event."""
+"""The page's text for the session's state after an event."""
 
-EARLIER_RULE = "a stop rule was met before: go on, or end the session"
-"""What is said of a stop rule that held a session which was resumed."""
+EARLIER_RULE = "a stop rule was met earlier: continue or end the session"
+"""The page's text for a stop rule that had paused a session before it was resumed."""
 
 LOST = {
     "input": "the controls", "disk": "the disk", "stream": "stream", "feedback": "",
@@ -72,7 +72,7 @@ ROUTINE = (
     "trial.", "order.", "questionnaire.", "step.", "block.", "pause.", "session.", "signal.",
     "scene.", "consent.", "stop_rule.",
 )  # fmt: skip
-"""Beginnings of event names that are no counts of a trial."""
+"""Prefixes of the events that are not counted in a trial."""
 
 
 class SessionView:
@@ -97,7 +97,7 @@ class SessionView:
     form_version
         Grows with every questionnaire.
     streams
-        What the recorder says of the streams of others.
+        The recorder's status of the external streams.
     consent
         What is asked before the session: file, version and text; nothing when none is.
     reported
@@ -175,7 +175,7 @@ class SessionView:
                 data = event.data
                 self.alarm = (
                     f"{data['questionnaire']} {data['score']} is {data['value']}, above "
-                    f"{data['above']}: go on, or end the session"
+                    f"{data['above']}: continue or end the session"
                 )
         self._count(event)
         if kind in LOST:
@@ -192,14 +192,14 @@ class SessionView:
             self.counts[event.name] += 1
 
     def hear_of_streams(self, status: Mapping[str, Any]) -> None:
-        """Take in what the recorder says now of the streams of others."""
+        """Store the recorder's present status of the external streams."""
         self.streams = status
         for stream in status.get("streams", ()):
             kept = self.rates.setdefault(stream["label"], deque(maxlen=RATES))
             kept.append(stream.get("rate_hz"))
 
     def _fault(self, kind: str, what: str, data: Mapping[str, Value]) -> None:
-        """Note what was lost, is back, or stands at another value."""
+        """Note what was lost, is back, or has another value."""
         name = str(data.get("what", ""))
         key = (kind, name or str(data.get("trigger", "")))
         if (kind, what) == ("feedback", "setting"):

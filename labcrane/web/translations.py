@@ -9,7 +9,7 @@ from labcrane.protocol.pages import Language
 
 @dataclass(frozen=True, slots=True)
 class Phrases:
-    """How one language says what an item takes, and why an answer was not taken.
+    """Phrases of one language: which answers an item takes, and why one was not accepted.
 
     Attributes
     ----------
@@ -18,8 +18,8 @@ class Phrases:
     text
         What an item of words takes.
     lacking, personal, possible
-        What is said of a questionnaire with gaps, of words that name somebody, and of a value that
-        an item does not take: the last with ``{takes}``.
+        Messages for a questionnaire with gaps, for text with personal data, and for a value that
+        an item does not take (with ``{takes}``).
     """
 
     one_of: str
@@ -40,7 +40,7 @@ class Phrases:
         return self.stepped.format(span=span, step=f"{item.step:g}") if item.step else span
 
     def refused(self, why: str, item: Item | None) -> str:
-        """Return why an answer was not taken; ``why`` is in the record's language, English."""
+        """Return why an answer was not accepted; ``why`` is in the record's language, English."""
         del why
         if item is None:
             return self.lacking
@@ -56,17 +56,17 @@ class Words:
     Attributes
     ----------
     wait, thanks
-        What is said while there is nothing to answer, and when the session is over.
+        Texts while there are no questions, and after the session has ended.
     progress
         A pattern with ``{done}`` and ``{total}``.
     takes
-        Says what an item takes.
+        Returns which answers an item takes.
     refused
-        Says why an answer, or what was handed in without one, was not taken; given the refusal in
-        the record, and the item if it was one.
+        Returns why an answer, or a questionnaire without one, was not accepted; takes the refusal
+        in the record, and the item if it is about one.
     seen, heard
-        What stands on the button with which something is reported, and what is said once it has
-        arrived; given what.
+        Return the label of the button that reports something, and the text after the report has
+        arrived; both take its name.
     """
 
     wait: str
@@ -95,11 +95,11 @@ NAMES: Mapping[Language, Mapping[str, str]] = {
     "fr": {"deformity": "déformation"},
     "es": {"deformity": "deformidad"},
 }
-"""Of what the bundled tasks ask about."""
+"""Names of the things that the bundled tasks ask about."""
 
 
 def _named(language: Language, pattern: str) -> Callable[[str], str]:
-    """Return what says a pattern of what is reported, by its name in a language."""
+    """Return a function that fills a pattern with a thing's name in a language."""
     return lambda what: pattern.format(what=NAMES.get(language, {}).get(what, what))
 
 
@@ -141,19 +141,19 @@ SPANISH_PHRASES = Phrases(
 )
 
 ENGLISH = Words(
-    wait="Please wait. There is nothing to answer now.",
-    thanks="Thank you for taking part. The session is over, and nothing more is to be done here.",
+    wait="Please wait. There are no questions right now.",
+    thanks="Thank you for taking part. The session has ended. You can stop here.",
     progress="{done} of {total} answered",
     back="Back",
     on="Next",
     no_answer="No answer",
-    hand_in="Hand in",
+    hand_in="Submit",
     saved="saved",
-    declined="declined",
-    not_taken="not taken",
+    declined="no answer given",
+    not_taken="not accepted",
     consent="Consent",
     version="version",
-    take_part="I have read this text and take part",
+    take_part="I have read this text and agree to take part",
     open_file="Open",
     takes=lambda item: item.takes,
     refused=lambda why, item: why,

@@ -124,9 +124,9 @@ def test_practice_and_tests_without_a_reference_have_no_indicator() -> None:
     followed = following(*reference("carry", 20.0), began(7, "touch"))
     lines = followed.lines(frame(7, 4.0, {}), SETTINGS)
     assert lines[1] == "time: 4.0 s, no reference yet"
-    assert lines[-1] == "no indicator: no reference time of this scenario"
+    assert lines[-1] == "no indicator: this scenario has no reference time"
     followed.take(began(8, "carry", practice=1))
-    assert followed.lines(frame(8, 4.0, {}), SETTINGS)[-1] == "no indicator: this is no test"
+    assert followed.lines(frame(8, 4.0, {}), SETTINGS)[-1] == "no indicator: this is not a test"
     start = began(9, "carry")
     followed.take(start)
     followed.take(ended(start, 25.0, {}))

@@ -169,7 +169,7 @@ def test_a_monitor_is_told_what_it_found_where_there_was_nothing() -> None:
         ((), "found nothing; yield one Finding at least"),
         ((7,), "yielded 7; yield Finding(verdict, text, advice)"),
         ((Finding(Verdict.PASS, ""),), "without a text; write what was looked at"),
-        ((Finding(Verdict.FAIL, "no stick"),), "nobody is told what to do about it; give the"),
+        ((Finding(Verdict.FAIL, "no stick"),), "without advice on what to do about it; give the"),
         ((Finding(Verdict.FAIL, "no stick", "Plug it in."),), "whose advice ends with a full stop"),
     ],
 )

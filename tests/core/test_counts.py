@@ -137,7 +137,7 @@ def test_a_session_that_stopped_is_named_with_its_resume_command(visit: Visit) -
     stopped(visit)
     with pytest.raises(
         ProtocolError,
-        match=r"has begun session 1 .*: by order; go on with: labcrane resume \S+study.yaml "
+        match=r"unfinished session 1 .*: by order; to continue, run: labcrane resume \S+study.yaml "
         r"--participant P001 --session 1 --simulate$",
     ):
         check_new(visit)

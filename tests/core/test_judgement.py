@@ -281,7 +281,7 @@ def test_a_session_that_stopped_in_the_wait_is_resumed_in_it_and_repeats_nothing
     assert [each.get("refused") for each in data_of(session, "order.override")] == [None]
     assert scores(visit)[-1].why == "set by the experimenter"
     assert data_of(session, "session.end")[-1]["reason"] == "complete"
-    with pytest.raises(ProtocolError, match="ran to its end"):
+    with pytest.raises(ProtocolError, match="is complete, so there is nothing"):
         run(replace(visit, resumed=True), Supervisor())
 
 
@@ -387,9 +387,9 @@ def test_page_and_terminal_say_what_it_waits_for_and_can_judge_also_after_a_resu
     view.take(Event("step.start", 0.0, {"step": 2, "kind": "block"}))
     view.take(Event("judgement.awaited", 1.0, {"trial": 3, "attempt": 1}))
     assert state_of(view) == "judgement"
-    assert "say whether it is completed, or override its end, and go on" in view.text
+    assert "mark it completed or not, or override its end, then continue" in view.text
     found = {one.ident: one for one in buttons(view)}
-    assert (found["order-start"].label, found["order-start"].primary) == ("Go on", True)
+    assert (found["order-start"].label, found["order-start"].primary) == ("Continue", True)
     for ident in ("order-start", "order-override", "order-completion0", "order-completion1"):
         assert found[ident].why == ""
     assert found["order-repeat"].why

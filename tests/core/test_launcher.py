@@ -46,7 +46,7 @@ class LateRecorder:
     asks = False
 
     def taken(self) -> list[str]:
-        return ["eeg: is asked for by type 'EEG' alone, and was confirmed"]
+        return ["eeg: is requested by type 'EEG' only, and was confirmed"]
 
     def stop(self) -> None:
         pass
@@ -77,7 +77,7 @@ def test_a_note_that_is_given_while_streams_are_waited_for_is_in_the_record(
     assert events["page.denied"]["why"] == "somebody asked for end"
     assert "order.start" not in events
     assert "start: the session has not begun; order it again when it has" in said
-    assert said.count("eeg: is asked for by type 'EEG' alone, and was confirmed") == 1
+    assert said.count("eeg: is requested by type 'EEG' only, and was confirmed") == 1
 
 
 class AskingRecorder(LateRecorder):
@@ -116,7 +116,7 @@ def test_a_session_begins_when_it_was_said_which_stream_is_meant_and_that_is_in_
     assert launcher._gate()
     assert recorder.asks is simulated
     if not simulated:
-        assert said[0] == "take: no stream 'oxygen' is asked about; there is eeg"
+        assert said[0] == "take: stream 'oxygen' needs no confirmation; these do: eeg"
         assert said[1] == "stream eeg is ActiChamp"
         assert launcher._kept == [StreamConfirmed("eeg", "ActiChamp", "supervisor")]
 

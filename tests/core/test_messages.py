@@ -49,12 +49,16 @@ def test_every_message_comes_out_of_the_pipe_as_it_went_in(message) -> None:
 
 @given(st.binary(max_size=300))
 def test_whatever_else_comes_out_of_the_pipe_is_no_message(line: bytes) -> None:
-    with pytest.raises(MessageError, match=f"^{len(line)} bytes that are no message to a session"):
+    with pytest.raises(
+        MessageError, match=f"^{len(line)} bytes that are not a message to a session"
+    ):
         decode(line)
 
 
 def test_a_message_that_is_too_large_is_refused_by_whoever_says_it() -> None:
-    with pytest.raises(MessageError, match=r"note: 20,000,\d+ bytes, and a session takes 65,536"):
+    with pytest.raises(
+        MessageError, match=r"note: 20,000,\d+ bytes, but a session accepts at most 65,536"
+    ):
         encode(Command(Order.NOTE, "x" * 20_000_000))
     largest = Command(Order.NOTE, "x" * (MOST_BYTES - 200))
     assert decode(encode(largest)) == largest

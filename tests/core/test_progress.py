@@ -94,12 +94,12 @@ def test_a_resumed_session_goes_on_where_the_machine_stood_and_ends_whole(died: 
 @pytest.mark.slow
 def test_a_session_that_is_complete_is_not_gone_on_with(visit: Visit) -> None:
     run(visit, ScriptedConsole())
-    with pytest.raises(ProtocolError, match="session 1 of P001-SIMULATED ran to its end"):
+    with pytest.raises(ProtocolError, match="session 1 of P001-SIMULATED is complete"):
         run(replace(visit, resumed=True), ScriptedConsole())
 
 
 def test_a_session_that_was_never_begun_is_not_gone_on_with(visit: Visit) -> None:
-    with pytest.raises(ProtocolError, match="there is no session to go on with; start one with"):
+    with pytest.raises(ProtocolError, match="and so no session to continue; start one with"):
         run(replace(visit, resumed=True), ScriptedConsole())
 
 
@@ -182,7 +182,7 @@ def test_a_session_begun_by_another_plan_is_not_gone_on_with(tmp_path: Path) -> 
     study = a_study(other, SHORT.replace("distances: [2]", "distances: [2.5]"))
     with pytest.raises(
         ProtocolError,
-        match=r"begun by another plan: trial 1 was pair '2m_\w+', distance 2\.0, .* and the plan "
+        match=r"begun with another plan: trial 1 was pair '2m_\w+', distance 2\.0, .* and the plan "
         r"has pair '2\.5m_\w+', distance 2\.5, .*; go on with the protocol, and the place in the "
         r"design, with which it was begun",
     ):

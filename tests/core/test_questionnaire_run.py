@@ -71,7 +71,7 @@ def test_an_answer_to_another_questionnaire_or_none_is_refused(tmp_path: Path) -
     noise = Command(Order.ANSWER, "{")
     seen = play(ratings(tmp_path), other, unknown, noise)
     why = [event.data["why"] for event in seen.events("questionnaire.refused")]
-    assert why[0].startswith("an answer says questionnaire 'subjective_accuracy', item and value")
+    assert why[0].startswith("an answer needs questionnaire 'subjective_accuracy', item and value")
     assert why[1] == "subjective_accuracy has no item 'speed'; it has rating"
     assert len(why) == 3
     assert not seen.events("questionnaire.answer")
@@ -84,7 +84,7 @@ def test_an_answer_that_names_a_person_is_refused_and_not_written_down(tmp_path:
     study = a_study(tmp_path, HEAD + more + steps)
     seen = play(study, answer("own", "ask jane.doe@example.org", item="why"))
     [refused] = seen.events("questionnaire.refused")
-    assert "an answer must not hold" in refused.data["why"]
+    assert "an answer must not contain" in refused.data["why"]
     assert not any("jane" in str(event.data) for frame in seen.frames for event in frame.events)
 
 

@@ -124,7 +124,7 @@ def test_an_ended_session_says_so_and_ends_its_trial(study: Study) -> None:
 
 def test_an_order_that_makes_no_sense_is_refused_in_words(study: Study) -> None:
     seen = rehearse(study, {5: give(Order.START), 6: give(Order.NOTE), 7: give(Order.COMPLETION)})
-    assert seen.events("order.start")[0].data["refused"] == "nothing waits to start"
+    assert seen.events("order.start")[0].data["refused"] == "nothing is waiting to start"
     assert seen.events("order.note")[0].data["refused"] == "a note needs words"
     assert seen.events("order.completion")[0].data["refused"] == "completion is 1 or 0, not ''"
 
@@ -171,7 +171,7 @@ def test_before_the_first_trial_there_is_nothing_to_judge(study: Study) -> None:
     seen = rehearse(study, orders, waits=True)
     for name in ("order.completion", "order.override"):
         (order,) = seen.events(name)
-        assert order.data["refused"] == "no trial is running, and none has ended"
+        assert order.data["refused"] == "no trial is running or has ended"
         assert "after" not in order.data
 
 

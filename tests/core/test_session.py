@@ -96,8 +96,8 @@ def test_a_session_is_never_run_twice(visit: Visit) -> None:
     before = path.read_bytes()
     with pytest.raises(
         ProtocolError,
-        match=r"P001-SIMULATED has already run session 1 to its end .*; check the number; no "
-        r"session of the study is left: take another --participant",
+        match=r"P001-SIMULATED has already completed session 1 .*; check the number; the "
+        r"study has no further session: use another --participant",
     ):
         run(visit, ScriptedConsole())
     assert path.read_bytes() == before

@@ -187,7 +187,7 @@ def test_a_decision_stays_open_when_a_fault_beside_it_is_over() -> None:
         ("pause.end", {"by": "disk"}),
     )  # fmt: skip
     assert state_of(view) == "decision"
-    assert view.alarm == "ssq total is 9, above 5: go on, or end the session"
+    assert view.alarm == "ssq total is 9, above 5: continue or end the session"
     view.take(Event("pause.end", 2.0, {"by": STOP}))
     assert (state_of(view), view.alarm) == ("between", "")
 
@@ -214,7 +214,7 @@ def test_before_a_session_begins_only_its_end_can_be_ordered() -> None:
         "the session has not begun; order it again when it has",
     }
     awaited = after(("feedback.awaited", {"what": "tone"}))
-    assert presses(awaited)["order-start"] == "feedback tone is awaited"
+    assert presses(awaited)["order-start"] == "the session is waiting for feedback tone"
     assert presses(awaited)["order-pause"] == ""
     assert state_of(awaited) == "starting"
 

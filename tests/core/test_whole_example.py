@@ -73,8 +73,8 @@ def test_a_session_that_was_run_is_refused_before_anything_is_shown(
     assert main(["run", str(protocol), "--participant", "P001", "--pilot", "--local"]) == 2
     said = capsys.readouterr()
     assert said.out == ""
-    assert "P001-PILOT has begun session 1" in said.err
-    assert "it did not come to its end: its process died; go on with: labcrane resume" in said.err
+    assert "P001-PILOT has an unfinished session 1" in said.err
+    assert "its process died; to continue, run: labcrane resume" in said.err
     assert "--participant P001 --session 1 --pilot" in " ".join(said.err.split())
 
 
@@ -89,4 +89,4 @@ def test_a_hurried_session_that_was_run_is_refused_before_anything_is_shown(
     assert main(words) == 2
     said = capsys.readouterr()
     assert said.out == ""
-    assert f"P001{stamps} has begun session 1" in said.err
+    assert f"P001{stamps} has an unfinished session 1" in said.err

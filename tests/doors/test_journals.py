@@ -57,8 +57,8 @@ def test_what_an_event_does_not_say_is_told_with_its_time(tmp_path: Path) -> Non
         writer.write_event(Event("session.start", stamp(0), CONTEXT), 0)
         writer.write_event(Event("session.end", stamp(240), {}), 240)
     said = (
-        r"ses-01_run\.xdf: event 'session\.end' at 1001\.000 s does not say what such an event "
-        r"says \(KeyError\('reason'\)\), so what the session owes is not known; labcrane recover"
+        r"ses-01_run\.xdf: event 'session\.end' at 1001\.000 s lacks a value that it "
+        r"needs \(KeyError\('reason'\)\), so the remaining trials are unknown; use labcrane recover"
     )
     with pytest.raises(LabcraneError, match=said):
         progress(journal, ["slew"])

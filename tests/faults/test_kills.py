@@ -170,7 +170,7 @@ def kill(
         assert run.poll() is None, run.communicate()
     if run.poll() is not None:  # there was nothing to go on with
         said = run.communicate()[0]
-        assert "so there is nothing to go on with" in " ".join(said.split()), said
+        assert "so there is nothing to continue" in " ".join(said.split()), said
         return set()
     launcher = psutil.Process(run.pid)
     everybody = [launcher, *launcher.children(recursive=True)]
@@ -190,7 +190,7 @@ def go_on(lab: Lab, data: Path) -> list[str]:
     for _ in range(4):
         resumed = lab.start("resume", data, "--no-page")
         said.append(" ".join(resumed.communicate(timeout=240)[0].split()))
-        if "so there is nothing to go on with" in said[-1]:
+        if "so there is nothing to continue" in said[-1]:
             return said
         assert resumed.returncode == 0, said
     raise AssertionError(f"it comes to no end: {said}")

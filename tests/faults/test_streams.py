@@ -126,7 +126,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
             plate.start()
         said.until("; or 'Mine' (source_id")
         said.order("take force")
-        said.until("2 streams that may be 'force'")
+        said.until("2 streams for 'force'")
         said.order(f"take force={source}-Mine")
         said.until("stream force is 'Mine'")
         sender.start()
@@ -177,7 +177,7 @@ def test_a_stream_of_a_type_is_the_one_that_somebody_confirmed_and_no_other_is_r
     (told,) = recorded.events["data"][recorded.events["name"] == "stream.confirmed"]
     assert (told["what"], told["by"]) == ("force", "terminal")
     assert told["which"].startswith("'Mine' (source_id '")
-    assert "is asked for by type" in said
+    assert "is requested by type" in said
     assert ", and was confirmed: it is 'Mine'" in said
 
 

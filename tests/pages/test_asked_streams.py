@@ -28,7 +28,7 @@ def test_the_supervisor_says_with_a_button_which_stream_is_meant(
             wait_for(lambda: room.process("pages"))
             browser.get(room.links()["supervisor"])
             shown(browser, "streams", "is 'Plate' (source_id 'plate-1')")
-            shown(browser, "take-force-0", "Take Plate of ")
+            shown(browser, "take-force-0", "Use Plate on ")
             assert not room.process("session"), "it has not begun"
             press(browser, "take-force-0")
             wait_for(lambda: any("stream force is 'Plate'" in line for line in room.said))

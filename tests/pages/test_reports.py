@@ -64,7 +64,7 @@ def test_a_deformity_is_reported_from_either_page_and_nothing_else_is(
         wait_for(lambda: room.process("pages"))
         links = room.links()
         browser.get(links["supervisor"])
-        shown(browser, "stage", "waits to start")
+        shown(browser, "stage", "ready to start")
         supervisor = browser.current_window_handle
         cookie = "; ".join(f"{each['name']}={each['value']}" for each in browser.get_cookies())
         browser.switch_to.new_window("tab")
@@ -99,7 +99,7 @@ def test_a_deformity_is_reported_from_either_page_and_nothing_else_is(
         press(browser, "order-skip-sure")
 
         # In the second, the supervisor.
-        shown(browser, "stage", "waits to start")
+        shown(browser, "stage", "ready to start")
         press(browser, "order-start")
         shown(browser, "stage", "trial")
         press(browser, "report-deformity")

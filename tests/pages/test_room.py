@@ -185,7 +185,7 @@ def test_the_lamp_tells_a_late_loop_and_one_that_says_nothing() -> None:
     assert (lamp.level, "50 ms late" in lamp.reason) == ("warn", True)
     live.silent_s = 3.2
     lamp = lamp_of(after(*BEGUN["running"]), live, EXPECTED)
-    assert (lamp.level, lamp.reason) == ("bad", "no frame of the session for 3 s")
+    assert (lamp.level, lamp.reason) == ("bad", "no frame from the session for 3 s")
 
 
 def test_the_lamp_tells_of_a_trial_of_which_no_frame_came(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,7 +194,7 @@ def test_the_lamp_tells_of_a_trial_of_which_no_frame_came(monkeypatch: pytest.Mo
     for now, level in ((1.9, "ok"), (2.1, "bad")):
         monkeypatch.setattr(time, "perf_counter", lambda now=now: now)
         assert lamp_of(view, live, EXPECTED).level == level
-    assert lamp_of(view, live, EXPECTED).reason == "no frame of the session for 2 s"
+    assert lamp_of(view, live, EXPECTED).reason == "no frame from the session for 2 s"
 
 
 @pytest.mark.parametrize(
@@ -251,9 +251,9 @@ def test_a_stream_that_is_asked_about_has_a_button_for_each_answer() -> None:
     }  # fmt: skip
     given = [(one.order, one.text, one.label) for one in answers(asked)]
     assert given == [
-        (Order.TAKE, "eeg=ActiChamp", "Take ActiChamp of lab-pc"),
-        (Order.TAKE, "eeg=Filtered", "Take Filtered of lab-pc"),
-        (Order.TAKE, "eeg=amp-2", "Take LiveAmp of next-door"),
+        (Order.TAKE, "eeg=ActiChamp", "Use ActiChamp on lab-pc"),
+        (Order.TAKE, "eeg=Filtered", "Use Filtered on lab-pc"),
+        (Order.TAKE, "eeg=amp-2", "Use LiveAmp on next-door"),
     ]
     for (_, text, _), fit in zip(given, fits, strict=True):
         assert answered(text, [asked]) == ("eeg", tuple(fit["identity"]))
@@ -263,7 +263,7 @@ def test_a_stream_that_is_asked_about_has_a_button_for_each_answer() -> None:
     view.hear_of_streams({"streams": [asked]})
     lamp = lamp_of(view, Punctual(), EXPECTED)
     assert (lamp.level, lamp.reason) == ("warn", "stream eeg is asked for")
-    assert lamp.remedy == "answer with the buttons beside it"
+    assert lamp.remedy == "choose with the buttons next to it"
 
 
 def test_the_lamp_at_the_end_is_what_was_left_behind() -> None:
@@ -334,8 +334,10 @@ def test_events_are_sentences_with_the_names_of_trials_and_without_holes() -> No
         assert said.text[0].isupper()
     targets = sentence(Event("target.entered", 0.0, {"trial": 4}), called)
     assert targets.text == "Target entered: trial 3 of 9"
-    refused = Event("order.start", 0.0, {"by": "supervisor", "refused": "nothing waits to start"})
-    assert sentence(refused, called).text == "Start was refused: nothing waits to start"
+    refused = Event(
+        "order.start", 0.0, {"by": "supervisor", "refused": "nothing is waiting to start"}
+    )
+    assert sentence(refused, called).text == "Start was refused: nothing is waiting to start"
     assert sentence(refused, called).level == "warn"
 
 
@@ -444,8 +446,8 @@ def test_a_page_that_knows_nothing_of_a_study_s_streams_does_not_say_that_there_
     path = tmp_path / "study.yaml"
     steps = "      - block: {task: aiming}\n"
     asked = "streams: {eeg: {type: EEG, name: amp}}\n"
-    for more, said in (("", "The study records no streams of others."),
-                       (asked, "Nothing is known yet of the study's streams: eeg.")):  # fmt: skip
+    for more, said in (("", "This study records no external streams."),
+                       (asked, "Waiting for the study's streams: eeg.")):  # fmt: skip
         path.write_text(STUDY.format(study="streams", steps=steps) + more, encoding="utf-8")
         study = load(path, discover())
         context = SimpleNamespace(
@@ -453,7 +455,7 @@ def test_a_page_that_knows_nothing_of_a_study_s_streams_does_not_say_that_there_
         )
         assert Snapshot(context, Earlier())._without_streams() == said
     view, expected = after(*BEGUN["running"]), ExpectedSession(1 / 240, streams=["eeg"])
-    assert lamp_of(view, Punctual(), expected).reason == "nothing is known of the streams eeg"
+    assert lamp_of(view, Punctual(), expected).reason == "no data on the streams eeg"
     view.hear_of_streams({"streams": []})
     assert lamp_of(view, Punctual(), expected).level == "ok"
 

@@ -68,7 +68,7 @@ def test_what_stands_around_the_machine_is_drawn_where_the_session_has_it(
         wait_for(lambda: room.process("pages"))
         browser.get(room.links()["supervisor"])
         for what in ("instructions", "retrieval"):
-            shown(browser, "stage", f"waits to start: {what}")
+            shown(browser, "stage", f"ready to start: {what}")
             press(browser, "order-start")
         shown(browser, "stage", "trial")
         (journal,) = (tmp_path / "data").rglob("ses-01_run.xdf")

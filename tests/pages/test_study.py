@@ -168,7 +168,7 @@ def test_what_people_wrote_is_text_on_the_page_and_no_markup(lab: Lab) -> None:
 def test_an_empty_folder_and_none_say_what_to_do(tmp_path: Path) -> None:
     (tmp_path / "data").mkdir()
     page = page_of(Reader(*checked_data(tmp_path)).overview(TODAY), TODAY, "now")
-    assert "Nobody has been enrolled yet." in page
+    assert "No participants are enrolled yet." in page
     with pytest.raises(RecordingError, match="give a study's folder, or the data folder in it"):
         checked_data(tmp_path / "nowhere")
 
@@ -231,6 +231,8 @@ def test_the_page_leads_to_every_viewer_and_report_and_lets_nobody_else_in(
         lambda: browser.find_elements(By.TAG_NAME, "figure") or "Sample" in browser.page_source
     )
     browser.back()
-    browser.find_element(By.CSS_SELECTOR, "a[aria-label='look at it: session 1 of P002']").click()
+    browser.find_element(
+        By.CSS_SELECTOR, "a[aria-label='Open recording: session 1 of P002']"
+    ).click()
     wait_for(lambda: browser.find_elements(By.ID, "scrub"))
     wait_for(lambda: "P002" in text(browser, "title"))

@@ -28,10 +28,10 @@ OURS, NEON = stream("labcrane.frame"), stream("Neon Gaze")
     ("seen", "network", "free", "said"),
     [
         ((NEON,), LAB, 0, ("none of LSL's 32 ports, 16572 to 16603, is free", "PortRange = 128")),
-        ((NEON,), LAB, 9, ("what is there is 'Neon Gaze' (Gaze, source_id 'of Neon Gaze')",
+        ((NEON,), LAB, 9, ("the network has 'Neon Gaze' (Gaze, source_id 'of Neon Gaze')",
                            "correct the protocol if", "labcrane doctor --peer")),
         ((OURS,), HERE, 9, ("no stream is, and LSL reaches this computer only, as here.cfg says",
-                            "leave out --local")),
+                            "drop --local")),
         ((OURS,), LAB, 9, ("no stream of another program is", "a firewall", "16572 to 16603")),
     ],
 )  # fmt: skip
@@ -81,7 +81,7 @@ def test_a_recorder_says_at_first_to_start_it_and_later_what_there_is_instead(
         assert at_first.endswith("is not on the network: start it, and check that LSL is enabled")
         monkeypatch.setattr(recorder_module, "PATIENCE_S", 0.0)
         (later,) = recorder.health()[0].warnings
-        assert later.startswith("eyes (name 'Absent_Gaze') is not on the network after 15 s: what ")
+        assert later.startswith("eyes (name 'Absent_Gaze') is not on the network after 15 s: the ")
         assert "'Absent Gaze' (Gaze, source_id 'of Absent Gaze')" in later
     finally:
         recorder.close()

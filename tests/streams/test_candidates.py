@@ -52,13 +52,13 @@ def test_an_answer_means_one_stream(
 @pytest.mark.parametrize(
     ("said", "there", "why"),
     [
-        ("eeg", (MINE, HIS), "2 streams that may be 'eeg' are called ''"),
-        ("eeg=amp-1", (MINE, DERIVED), "2 streams that may be 'eeg' are called 'amp-1'"),
+        ("eeg", (MINE, HIS), "2 streams for 'eeg' are called ''"),
+        ("eeg=amp-1", (MINE, DERIVED), "2 streams for 'eeg' are called 'amp-1'"),
         ("eeg=amp-3", (MINE, HIS), "0 streams .*: 'ActiChamp' .source_id 'amp-1'. of lab-pc; 'Li"),
-        ("gaze", (MINE,), "no stream 'gaze' is asked about; there is eeg"),
-        ("", (MINE,), "no stream '' is asked about; there is eeg"),
-        ("eeg", (), "no stream 'eeg' is asked about; none is asked about"),
-        ("eeg=none", (MINE,), "stream 'eeg' is required, and cannot be left out"),
+        ("gaze", (MINE,), "stream 'gaze' needs no confirmation; these do: eeg"),
+        ("", (MINE,), "stream '' needs no confirmation; these do: eeg"),
+        ("eeg", (), "stream 'eeg' needs no confirmation; no stream needs confirmation"),
+        ("eeg=none", (MINE,), "stream 'eeg' is required and cannot be left out"),
     ],
 )
 def test_an_answer_that_means_none_or_two_says_what_there_is(
@@ -74,10 +74,10 @@ def test_what_is_not_required_can_be_left_out() -> None:
 
 def test_the_question_names_who_may_be_meant_and_how_to_answer() -> None:
     one = question("eeg", "EEG", [MINE], required=True)
-    assert "is 'ActiChamp' (source_id 'amp-1') of lab-pc meant? take eeg records it;" in one
+    assert "Record 'ActiChamp' (source_id 'amp-1') of lab-pc? Enter take eeg. To avoid" in one
     two = question("eeg", "EEG", [MINE, NAMELESS], required=False)
-    assert "of lab-pc; or 'Unicorn' (no lasting source_id) of lab-pc meant?" in two
-    assert "take eeg=SOURCE_ID (or its name) records it, take eeg=none leaves it out" in two
+    assert "of lab-pc; or 'Unicorn' (no persistent source_id) of lab-pc?" in two
+    assert "Enter take eeg=SOURCE_ID (or its name), or take eeg=none to leave it out" in two
 
 
 @pytest.fixture
@@ -109,7 +109,7 @@ def test_nothing_of_a_stream_is_recorded_before_it_is_confirmed_and_it_is_asked_
         assert watched("eeg")["condition"] == "asked about"
         assert "'Neighbour' (source_id 'amplifier-2')" in watched("eeg")["warnings"][0]
         assert lab.streams() == {}  # nobody has said that either of them may be
-        with pytest.raises(StreamError, match="2 streams that may be 'eeg'"):
+        with pytest.raises(StreamError, match="2 streams for 'eeg'"):
             handle.confirm("eeg")
         said = handle.confirm("eeg=amplifier-1")
         assert said == ("eeg", "'Amplifier' (source_id 'amplifier-1')")
@@ -128,9 +128,9 @@ def test_nothing_of_a_stream_is_recorded_before_it_is_confirmed_and_it_is_asked_
     (one,) = [stream for stream in found if stream.header.type == "AskedEEG"]
     assert one.header.name == "Amplifier"
     report = SyncReport((judge_stream(one, resync(one).quality, Limits()),))
-    was = "is asked for by type 'AskedEEG' alone, and was confirmed: it is 'Amplifier'"
+    was = "is requested by type 'AskedEEG' only, and was confirmed: it is 'Amplifier'"
     assert any(was in line for line in report.details())
-    assert not any("alone" in line for line in report.advice())
+    assert not any(", and was confirmed" in line for line in report.advice())
 
 
 @pytest.mark.slow

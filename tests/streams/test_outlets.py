@@ -136,6 +136,6 @@ def test_an_outlet_never_lets_liblsl_choose_the_time(run):
     outlets = Outlets(run, "study/P002/ses-01")
     frame: Frame = make_frame(run)
     assert frame.tick.due == 0.0
-    with pytest.raises(StreamError, match="cannot be stamped"):
+    with pytest.raises(StreamError, match="cannot have the timestamp"):
         outlets.push(frame)
     outlets.close()

@@ -50,8 +50,8 @@ def test_streams_that_come_late_return_or_never_send_are_all_recorded(lab):
     lab.sender("Gaze", "Gaze", "")
     status = until(recorder, lambda status: named(status, "Gaze")["samples"] > 0)
     text = " ".join(named(status, "Gaze")["warnings"])
-    assert "has 2 channels, 3 are expected" in text
-    assert "nominal rate of 100 Hz, 50 Hz are expected" in text
+    assert "has 2 channels; 3 are expected" in text
+    assert "nominal rate of 100 Hz; 50 Hz are expected" in text
     assert "no source_id" in text or "made up by pylsl" in text
     first.kill()
     status = until(recorder, lambda status: named(status, "Amplifier")["condition"] == "silent")
@@ -175,9 +175,9 @@ def test_a_source_that_comes_back_from_another_session_is_warned_of(lab, tmp_pat
         lab.sender("Amplifier", "EEG", "amplifier-1")
     status = until(
         recorder,
-        lambda status: "not in this LSL session" in " ".join(status["streams"][0]["warnings"]),
+        lambda status: "outside this LSL session" in " ".join(status["streams"][0]["warnings"]),
     )
-    assert "another laboratory's; give every device a source_id" in " ".join(
+    assert "another laboratory; give every device a unique source_id" in " ".join(
         status["streams"][0]["warnings"]
     )
     assert stop(recorder) == 0
@@ -204,7 +204,7 @@ def test_a_required_stream_that_is_not_what_was_expected_holds_the_session_back(
     recorder = lab.recorder(EEG | {"channels": 64})
     status = until(recorder, lambda status: named_or_none(status, "Amplifier") == "flows")
     assert not status["ready"]
-    assert status["streams"][0]["misfits"] == ["has 2 channels, 64 are expected"]
+    assert status["streams"][0]["misfits"] == ["has 2 channels; 64 are expected"]
     assert stop(recorder) == 0
 
 
@@ -234,7 +234,7 @@ def test_a_recorder_that_is_told_nonsense_says_what_it_understands():
         encoding="utf-8",
         check=False,
     )
-    assert "cannot be told colour" in done.stderr
+    assert "has no setting colour" in done.stderr
 
 
 def test_a_request_that_any_stream_would_meet_is_refused():
@@ -254,7 +254,7 @@ def test_a_request_that_two_streams_meet_takes_none_silently(lab):
     for one in status["streams"]:
         (text,) = one["misfits"]
         assert "so do 2 streams: 'Amplifier' (amplifier-1), 'Amplifier' (filter-1)" in text
-        assert "give the name or source_id of the one that is meant, or several: true" in text
+        assert "give the name or source_id of the right one, or several: true" in text
     assert stop(recorder) == 0
     recorded, _ = read_streams(parts(lab.journal))
     assert {stream.header.source_id for stream in recorded} == {"amplifier-1", "filter-1"}

@@ -45,7 +45,7 @@ def test_what_is_asked_for_by_type_alone_is_asked_about_and_said(asked, said):
     assert bool(text) is said
     if text:
         assert text == (
-            "is asked for by type 'EEG' alone, and was confirmed: it is 'ActiChamp-0' (source_id "
+            "is requested by type 'EEG' only, and was confirmed: it is 'ActiChamp-0' (source_id "
             "'amp-1') of next-door"
         )
 

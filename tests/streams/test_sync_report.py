@@ -51,10 +51,10 @@ def test_a_stream_in_order_passes():
 def test_samples_whose_stamps_are_worked_back_are_counted_once_and_told():
     notes = [Note(100.0, {"event": "unstamped", "samples": part}) for part in ([0, 8], [3, 8])]
     findings = judged(recorded(notes=notes)).findings
-    (found,) = (each for each in findings if "without a stamp" in each.text)
+    (found,) = (each for each in findings if "without a timestamp" in each.text)
     assert found.verdict is Verdict.WARN
-    assert found.text.startswith("8 samples came without a stamp: a recorder connected in the mid")
-    assert found.advice == "leave out the trial they are in, if it is one"
+    assert found.text.startswith("8 samples came without a timestamp: a recorder connected in a")
+    assert found.advice == "exclude the trial they are in, if there is one"
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -64,7 +64,7 @@ def test_a_buffer_that_shrinks_is_told(seed: int) -> None:
     times[: int(draw.integers(5_000, 25_000))] += draw.uniform(0.02, 0.045)
     raw = source(SourceClock(), np.maximum.accumulate(times), draw)
     stream = replace(recorded(), time_raw=SourceClock()(times), arrivals=raw.arrivals)
-    (found,) = (each for each in judged(stream).findings if "were shifted" in each.text)
+    (found,) = (each for each in judged(stream).findings if "timestamps shifted" in each.text)
     assert found.verdict is Verdict.WARN
     assert "or its delay changed" in found.text
     corrected = resync(stream)
@@ -82,14 +82,14 @@ def test_a_buffer_that_shrinks_is_told(seed: int) -> None:
         ({"probe_age_s": 50.0}, Verdict.FAIL, "up to 50 s without a clock probe"),
         ({"rate_hz": 400.0}, Verdict.FAIL, "400.00 Hz instead of 500 Hz"),
         ({"gaps": 2, "longest_gap_s": 0.4}, Verdict.WARN, "2 gaps, the longest 0.400 s"),
-        ({"lag_s": -1.7e9}, Verdict.FAIL, "its stamps lie -1700000000.000 s before"),
+        ({"lag_s": -1.7e9}, Verdict.FAIL, "its timestamps are -1700000000.000 s before"),
         ({"dropped": 3}, Verdict.WARN, "3 samples are missing"),
-        ({"backward": 8}, Verdict.WARN, "8 samples are placed before one that came earlier"),
-        ({"grid_s": 1e-3}, Verdict.WARN, "its stamps are cut to 1 ms"),
-        ({"grid_s": 1 / 64}, Verdict.WARN, "its stamps are cut to 15.625 ms"),
+        ({"backward": 8}, Verdict.WARN, "8 samples are placed before one that arrived earlier"),
+        ({"grid_s": 1e-3}, Verdict.WARN, "its timestamps are cut to 1 ms"),
+        ({"grid_s": 1 / 64}, Verdict.WARN, "its timestamps are cut to 15.625 ms"),
         ({"silent_s": 9.0}, Verdict.FAIL, "it died: no sample came in the last 9 s"),
         ({"unsure": 12}, Verdict.WARN, "12 samples are near a step"),
-        ({"unprobed": 7}, Verdict.FAIL, "7 samples are of a clock that was never probed"),
+        ({"unprobed": 7}, Verdict.FAIL, "7 samples are from a clock that was never probed"),
         ({"rtt_p50_s": math.nan}, Verdict.FAIL, "never probed"),
     ],
 )
@@ -129,7 +129,7 @@ def test_samples_that_a_sources_counter_left_out_are_judged():
     report = judged(recorded(clock=SourceClock(ppm=40.0), notes=notes))
     (finding,) = report.findings
     assert (finding.verdict, report.quality.dropped) == (Verdict.FAIL, 402)
-    assert finding.text == "402 samples are missing, by its counter or between its stamps"
+    assert finding.text == "402 samples are missing, by its counter or by its timestamps"
 
 
 def test_what_is_not_known_fails():
@@ -196,7 +196,7 @@ def test_a_streams_own_header_says_how_it_is_read():
     treatment = treatment_of(replace(EEG, desc=timing))
     assert treatment.can_drop_samples
     assert treatment.latency_s == 0.0516
-    with pytest.raises(RecordingError, match="'soon', which is no number"):
+    with pytest.raises(RecordingError, match="'soon', which is not a number"):
         treatment_of(replace(EEG, desc={"synchronization": {"offset_mean": "soon"}}))
 
 

@@ -103,7 +103,7 @@ def test_what_is_wrong_is_said(change, text, sane):
 
 
 def test_a_stream_that_is_not_what_was_expected_is_not_sane():
-    assert not replace(WELL, misfits=["has 2 channels, 64 are expected"]).sane
+    assert not replace(WELL, misfits=["has 2 channels; 64 are expected"]).sane
 
 
 def test_markers_may_be_waited_for_without_a_sample():

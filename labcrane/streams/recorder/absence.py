@@ -67,8 +67,8 @@ def cause(
     """
     if not free:
         return (
-            f"none of LSL's {len(ports)} ports, {ports[0]} to {ports[-1]}, is free, so that "
-            "nothing can be searched for; end programs that search all the time, or set "
+            f"none of LSL's {len(ports)} ports, {ports[0]} to {ports[-1]}, is free, so "
+            "no stream can be searched for; end programs that search continuously, or set "
             "PortRange = 128 in lsl_api.cfg (docs/lab.md)"
         )
     others = sorted(
@@ -79,17 +79,17 @@ def cause(
     if others:
         more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
         return (
-            f"what is there is {', '.join(others[:MOST_NAMED])}{more}; correct the protocol if "
-            "one of them is meant, else start its program; labcrane doctor --peer ADDRESS tells "
-            "whether a firewall stops it"
+            f"the network has {', '.join(others[:MOST_NAMED])}{more}; correct the protocol if "
+            "one of them is meant, otherwise start its program; labcrane doctor --peer ADDRESS "
+            "shows whether a firewall blocks it"
         )
     if network.loopback:
         return (
-            f"no stream is, and {network}; leave out --local for streams of other computers, else "
+            f"no stream is, and {network}; drop --local for streams of other computers; otherwise "
             "start its program"
         )
     return (
         "no stream of another program is, so that LSL may be blocked; labcrane doctor --peer "
-        "ADDRESS tells whether a firewall stops it, there or here (UDP 16571, and UDP and TCP "
+        "ADDRESS shows whether a firewall blocks it, there or here (UDP 16571, and UDP and TCP "
         f"{ports[0]} to {ports[-1]})"
     )

@@ -47,7 +47,7 @@ class Candidate:
 def called(identity: Identity) -> str:
     """Return a stream in words."""
     source_id, name, _ = identity
-    return f"{name!r} ({f'source_id {source_id!r}' if source_id else 'no lasting source_id'})"
+    return f"{name!r} ({f'source_id {source_id!r}' if source_id else 'no persistent source_id'})"
 
 
 def question(label: str, kind: str, candidates: Sequence[Candidate], *, required: bool) -> str:
@@ -55,10 +55,10 @@ def question(label: str, kind: str, candidates: Sequence[Candidate], *, required
     which = "; or ".join(map(str, candidates))
     lone = len(candidates) == 1
     how = f"take {label}" if lone else f"take {label}=SOURCE_ID (or its name)"
-    leave = "" if required else f", take {label}={NONE} leaves it out"
+    leave = "" if required else f", or take {label}={NONE} to leave it out"
     return (
-        f"is asked for by type {kind!r} alone: is {which} meant? {how} records it{leave}; the "
-        "protocol can say it for good by source_id"
+        f"is requested by type {kind!r} only. Record {which}? Enter {how}{leave}. To avoid this "
+        "question, set source_id in the protocol"
     )
 
 
@@ -81,12 +81,12 @@ def answered(text: str, streams: Sequence[Mapping[str, Any]]) -> tuple[str, Iden
     label, _, word = (part.strip() for part in text.partition("="))
     asked = {one["label"]: one for one in streams if one["candidates"]}
     if label not in asked:
-        there = f"there is {', '.join(sorted(asked))}" if asked else "none is asked about"
-        raise StreamError(f"take: no stream {label!r} is asked about; {there}")
+        there = f"these do: {', '.join(sorted(asked))}" if asked else "no stream needs confirmation"
+        raise StreamError(f"take: stream {label!r} needs no confirmation; {there}")
     if word == NONE:
         if asked[label]["required"]:
             raise StreamError(
-                f"take: stream {label!r} is required, and cannot be left out; start its program, "
+                f"take: stream {label!r} is required and cannot be left out; start its program, "
                 "or write required: false in the protocol"
             )
         return label, NOBODY
@@ -95,7 +95,7 @@ def answered(text: str, streams: Sequence[Mapping[str, Any]]) -> tuple[str, Iden
     if len(fitting) != 1:
         which = "; ".join(map(str, candidates))
         raise StreamError(
-            f"take: {len(fitting)} streams that may be {label!r} are called {word!r}; write "
+            f"take: {len(fitting)} streams for {label!r} are called {word!r}; write "
             f"{label}=SOURCE_ID, or its name, of one of them: {which}"
         )
     return label, fitting.pop()

@@ -94,7 +94,7 @@ class RecorderConfig:
         known = cls.__dataclass_fields__
         if unknown := sorted(set(fields) - set(known)):
             raise StreamError(
-                f"a recorder cannot be told {', '.join(unknown)}; it can be told {', '.join(known)}"
+                f"a recorder has no setting {', '.join(unknown)}; it has {', '.join(known)}"
             )
         streams = tuple(StreamRequest.of(one) for one in fields.get("streams", ()))
         rest = {key: value for key, value in fields.items() if key not in ("journal", "streams")}

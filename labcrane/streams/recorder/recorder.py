@@ -166,7 +166,7 @@ class Recorder:
             kind, required = request.type or "", request.required
             said = question(request.label, kind, candidates, required=required)
         elif request.confirmed == NOBODY:
-            said = "was left out: no stream of its type is meant"
+            said = "was left out: no stream of its type was chosen"
         elif time.monotonic() - self._began < PATIENCE_S:
             said = absent(request)
         else:
@@ -221,7 +221,7 @@ class Recorder:
             return []
         return [
             f"fits {request}, but so do {len(names)} streams: {', '.join(names)}; give the name or "
-            "source_id of the one that is meant, or several: true"
+            "source_id of the right one, or several: true"
         ]
 
     def _find_duplicates(self, found: "list[pylsl.StreamInfo]", now: float) -> None:
@@ -251,14 +251,14 @@ class Recorder:
                 since = max(self._unseen.setdefault(key, time.perf_counter()), flow.reset_at)
                 if flow.resets and flow.last - since > 2 * FORGET_S:
                     recorded.warn(
-                        "came back, but not in this LSL session: it may be another laboratory's; "
-                        "give every device a source_id that no other one has"
+                        "came back outside this LSL session: it may belong to another laboratory; "
+                        "give every device a unique source_id"
                     )
                 continue
             self._unseen.pop(key, None)
             if flow.resets and now_on != (was := recorded.inlet.info.hostname()):
                 recorded.warn(
-                    f"was sent by {was} and came back from {now_on}: see that it is the same device"
+                    f"was sent by {was} and came back from {now_on}: check that it is the same one"
                 )
 
     @staticmethod

@@ -73,6 +73,6 @@ def _seconds(header: StreamHeader, text: str) -> float:
         return float(text or 0.0)
     except ValueError:
         raise RecordingError(
-            f"stream {header.name!r} states offset_mean {text!r}, which is no number of seconds; "
-            "give its latency in the protocol"
+            f"stream {header.name!r} states offset_mean {text!r}, which is not a number of "
+            "seconds; give its latency in the protocol"
         ) from None

@@ -1,4 +1,4 @@
-"""Buttons of the control room: what makes sense now, and which of them comes first."""
+"""Buttons of the control room: which are possible now, and which one is primary."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -11,14 +11,14 @@ from labcrane.web.state import SessionView
 
 @dataclass(frozen=True, slots=True)
 class Button:
-    """A button: what it orders, what it is called now, and its key.
+    """A button: its action, its present label and its key.
 
     Attributes
     ----------
     why
-        Why it makes no sense now; empty where it does.
+        Why it is not possible now; empty if it is possible.
     asks
-        What is asked before it is obeyed; empty for nothing.
+        Question to confirm before the action is sent; empty for none.
     """
 
     ident: str
@@ -32,31 +32,33 @@ class Button:
     danger: bool = False
 
     def as_json(self) -> dict[str, Any]:
-        """Return what JSON can hold."""
+        """Return the button as a mapping for JSON."""
         return asdict(self)
 
 
 def answers(stream: Mapping[str, Any]) -> list[Button]:
-    """Return the buttons that say which stream of a type is meant, where that is asked."""
+    """Return the buttons that select one of several streams of a type, if a choice is needed."""
     label, words = stream["label"], [each["identity"] for each in stream["candidates"]]
     ids = [source_id for source_id, _, _ in words]
     found = []
     for at, (source_id, name, _) in enumerate(words):
-        # Programs may share a source_id, and then have names.
+        # Programs may share a source_id; their names then distinguish them.
         word = source_id if source_id and ids.count(source_id) == 1 else name
         host = stream["candidates"][at]["host"]
         found.append(
             Button(
-                f"take-{label}-{at}", Order.TAKE, f"{label}={word}", f"Take {name} of {host}", "T"
+                f"take-{label}-{at}", Order.TAKE, f"{label}={word}", f"Use {name} on {host}", "T"
             )
         )
     if found and not stream["required"]:
-        found.append(Button(f"take-{label}-none", Order.TAKE, f"{label}=none", "Leave out", ""))
+        found.append(
+            Button(f"take-{label}-none", Order.TAKE, f"{label}=none", "Record without it", "")
+        )
     return found
 
 
 def buttons(view: SessionView) -> list[Button]:
-    """Return all buttons as they are now; exactly one is primary unless nothing can be done."""
+    """Return all buttons; exactly one is primary unless no action is possible."""
 
     def why(order: Order) -> str:
         return ENDED if view.over else why_not(order, view.standing) or ""
@@ -71,21 +73,21 @@ def buttons(view: SessionView) -> list[Button]:
         ),
         Button("order-repeat", Order.REPEAT, "", "Repeat trial", "R", why(Order.REPEAT)),
         Button("order-skip", Order.SKIP, "", "Skip", "S", why(Order.SKIP),
-               asks="Skip what runs now? It is not asked for again.", danger=True),
+               asks="Skip this trial, break or questionnaire? It is not repeated.", danger=True),
         Button("order-override", Order.OVERRIDE, "", "Override end", "O", why(Order.OVERRIDE)),
         Button("order-completion1", Order.COMPLETION, "1", "Completed", "C", judged),
         Button("order-completion0", Order.COMPLETION, "0", "Not completed", "X", judged),
         Button(
             "order-end", Order.END, "", "End session", "E", why(Order.END),
-            asks="End the session now? What is recorded is kept.", danger=True,
+            asks="End the session now? The recorded data are kept.", danger=True,
         ),
     ]  # fmt: skip
 
 
 def _start(standing: Standing) -> str:
-    """Return what the order to start does now."""
+    """Return the label of the start button: what it does now."""
     if STOP in standing.holds:
-        return "Go on all the same"
+        return "Continue anyway"
     if EXAMINER in standing.holds or standing.stage is SessionStage.JUDGEMENT:
-        return "Go on"
+        return "Continue"
     return f"Start: {standing.what}" if standing.what else "Start"

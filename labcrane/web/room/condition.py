@@ -1,4 +1,4 @@
-"""Condition of a session: which state it is in, and one lamp with its reason in words."""
+"""Condition of a session: its state, and one status light with its reason in words."""
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,21 +11,21 @@ from labcrane.web.live import Live
 from labcrane.web.state import SessionView
 
 SILENT_S = 1.0
-"""A running session sends frames all the time; after so long without one it is said."""
+"""A running session sends frames continuously; without one for so long, the page reports it."""
 
 FIRST_S = 2.0
-"""How long after a trial's beginning the first frame may come: the page may have to find it."""
+"""How long after a trial's start the first frame may come: the page must find the stream."""
 
 STATES = (
     "starting", "consent", "waiting", "running", "paused", "fault", "break", "fixation",
     "questionnaire", "decision", "judgement", "between", "ended",
 )  # fmt: skip
-"""What a session can be doing; the page has a look for each."""
+"""States of a session; the page has a colour and a heading for each."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lamp:
-    """Whether all is well: ``"ok"``, ``"warn"`` or ``"bad"``, why, and what to do."""
+    """Status light: ``"ok"``, ``"warn"`` or ``"bad"``, the reason, and the remedy."""
 
     level: str
     reason: str
@@ -33,13 +33,13 @@ class Lamp:
 
 
 REMEDIES: Mapping[str, str] = {
-    "trigger": "plug the device in; its codes stay in the record, and the session goes on",
-    "input": "check the controls' cable and power; the session goes on when they are back",
-    "disk": "free space or connect the disk again; nothing is lost meanwhile",
-    "stream": "check the device and its program; the recorder goes on looking for it",
-    "asked": "answer with the buttons beside it",
-    "feedback": "it is started again; end the session if it keeps failing",
-    "picture": "pause; look at the operator's window, the graphics driver and other programs",
+    "trigger": "plug the device in; its codes stay in the record, and the session continues",
+    "input": "check the controls' cable and power; the session continues when they are back",
+    "disk": "free space or reconnect the disk; no data are lost meanwhile",
+    "stream": "check the device and its program; the recorder keeps searching for it",
+    "asked": "choose with the buttons next to it",
+    "feedback": "it is restarted automatically; end the session if it keeps failing",
+    "picture": "pause; check the operator's window, the graphics driver and other programs",
 }
 """What to do about each kind of fault."""
 
@@ -66,7 +66,7 @@ def state_of(view: SessionView) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ExpectedSession:
-    """What is to come of a study while it runs.
+    """The streams and views that a running study must deliver.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class ExpectedSession:
     presented
         How much they must show.
     streams
-        The study's names for the streams of others.
+        The study's names for the external streams.
     """
 
     period_s: float
@@ -87,9 +87,9 @@ class ExpectedSession:
 
 
 def lamp_of(view: SessionView, live: Live, expected: ExpectedSession, trouble: str = "") -> Lamp:
-    """Return the lamp of a session: the worst of what is known.
+    """Return the status light of a session: the worst of its problems.
 
-    ``trouble`` is why what the session sends cannot be drawn, or nothing.
+    ``trouble`` is why the session's data cannot be drawn; empty if they can be.
     """
     if state_of(view) == "ended":
         return _at_the_end(view)
@@ -104,8 +104,14 @@ def lamp_of(view: SessionView, live: Live, expected: ExpectedSession, trouble: s
         *_of_the_loop(live, expected.period_s),
     ]
     if trouble:
-        why = f"what is drawn here may not be as it is: {trouble}"
-        found.append(Lamp("warn", why, "the session and its views go on; tell who keeps labcrane"))
+        why = f"this display may be wrong: {trouble}"
+        found.append(
+            Lamp(
+                "warn",
+                why,
+                "the session and its views continue; report it to your labcrane maintainer",
+            )
+        )
     worst = next((one for one in found if one.level == "bad"), None)
     if worst or found:
         return worst or found[0]
@@ -121,19 +127,19 @@ def _at_the_end(view: SessionView) -> Lamp:
 
 
 def _of_frames(view: SessionView, live: Live) -> Iterator[Lamp]:
-    """Yield that frames do not come; the first one has a while from the trial's beginning."""
+    """Yield a problem if no frames arrive; the first one may take a while after a trial starts."""
     silent, patience = live.silent_s, SILENT_S
     if silent is None:
         silent, patience = time.perf_counter() - view.trial_began, FIRST_S
     if view.trial and silent > patience:
         yield Lamp(
-            "bad", f"no frame of the session for {silent:.0f} s", "look at the terminal; the "
-            "session is ended and saved by itself if it hangs",
+            "bad", f"no frame from the session for {silent:.0f} s", "look at the terminal; a "
+            "session that hangs is ended and saved automatically",
         )  # fmt: skip
 
 
 def _under_way(view: SessionView) -> bool:
-    """Whether a trial has run for so long that everything must have come."""
+    """Whether a trial has run for so long that all streams must have arrived."""
     return bool(view.trial) and time.perf_counter() - view.trial_began >= FIRST_S
 
 
@@ -155,7 +161,7 @@ def _of_pictures(view: SessionView, expected: ExpectedSession) -> Iterator[Lamp]
 def _of_streams(view: SessionView, expected: ExpectedSession) -> list[Lamp]:
     found = []
     if not view.streams and expected.streams and _under_way(view):
-        unknown = f"nothing is known of the streams {', '.join(expected.streams)}"
+        unknown = f"no data on the streams {', '.join(expected.streams)}"
         found.append(Lamp("bad", unknown, REMEDIES["stream"]))
     for stream in view.streams.get("streams", ()):
         label, condition = stream["label"], stream["condition"]
@@ -177,7 +183,7 @@ def _of_the_loop(live: Live, period_s: float) -> list[Lamp]:
         return []
     return [
         Lamp(
-            "warn", f"the loop was {1000 * late:.0f} ms late in the last second, a tick has "
+            "warn", f"the loop was {1000 * late:.0f} ms late in the last second; a tick lasts "
             f"{1000 * period_s:.1f} ms", "close other programs on this computer",
         )
     ]  # fmt: skip

@@ -17,7 +17,7 @@ Give = Callable[[str, str], str]
 
 
 class Room(Element, component="room.js"):
-    """Draws what it is told, and passes on what the supervisor wants.
+    """Draws its snapshot, and passes on the experimenter's actions.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-// Control room: draws what the server says of a session, and says what the supervisor wants.
+// Control room: draws the state of a session from the server, and sends the experimenter's actions.
 // Everything it shows comes from `show`; what people write leaves by `order`, and a field is
 // emptied only when the server has taken its words: a message lost with a connection is sent again.
 
@@ -35,7 +35,7 @@ export default {
   <p v-for="question in s.questions" :key="question.ident" :id="question.ident"
      class="room-question">{{ question.text }}</p>
 
-  <div class="room-actions" role="toolbar" aria-label="Orders" v-show="s.state !== 'ended'">
+  <div class="room-actions" role="toolbar" aria-label="Actions" v-show="s.state !== 'ended'">
     <button v-for="b in safe" :key="b.ident" :id="b.ident" type="button" @click="press(b)"
       class="room-button" :class="{primary: b.primary}" :aria-disabled="b.why ? 'true' : 'false'"
       :title="b.why || b.label">{{ b.label }} <kbd aria-hidden="true">{{ b.key }}</kbd></button>
@@ -56,7 +56,7 @@ export default {
     <p v-if="s.report.remedy" id="report-remedy">{{ s.report.remedy }}</p>
     <h3>Saved</h3>
     <ul id="saved"><li v-for="line in s.report.saved" :key="line">{{ line }}</li></ul>
-    <h3>How right the time stamps are</h3>
+    <h3>Timestamp accuracy</h3>
     <div class="room-scroll" tabindex="0" role="group" aria-label="Sync report">
       <table id="sync"><thead><tr><th v-for="head in s.report.columns" :key="head" scope="col">
         {{ head }}</th></tr></thead>
@@ -65,11 +65,11 @@ export default {
     </div>
     <ul><li v-for="line in s.report.advice" :key="line">{{ line }}</li></ul>
     <p><button type="button" class="room-button primary" id="close-page" @click="close()">
-      Close this page</button> <span class="room-faint">It stays until it is closed, also after a
+      Close this page</button> <span class="room-faint">It stays open until you close it, even after a
       reload.</span></p>
   </section>
   <section v-else-if="s.state === 'ended'" class="room-card room-report" id="saving">
-    <h2>Saving</h2><p>The participant file is being made and its clocks are being corrected.</p>
+    <h2>Saving</h2><p>Writing the participant file and correcting its clocks.</p>
   </section>
 
   <div class="room-grid">
@@ -104,8 +104,8 @@ export default {
       </section>
       <section class="room-card" v-show="s.performance"><h2>Performance</h2>
         <p class="room-lines" id="performance" role="status">{{ s.performance }}</p></section>
-      <section class="room-card"><h2>Newest movements</h2>
-        <p v-if="!s.measures.length" class="room-faint">The tasks of this study measure nothing.</p>
+      <section class="room-card"><h2>Latest movements</h2>
+        <p v-if="!s.measures.length" class="room-faint">The tasks of this study have no measures.</p>
         <template v-else>
           <label class="room-field">Measure <select id="measure" v-model="measure">
             <option v-for="m in s.measures" :key="m.name" :value="m.name">{{ m.label }}</option>
@@ -119,18 +119,18 @@ export default {
             <text x="36" y="132" text-anchor="end">{{ bottom }}</text>
             <circle v-for="(p, at) in dots" :key="at" :cx="p.x" :cy="p.y" :r="p.now ? 4.5 : 2.5"
               :class="p.kind"/>
-            <text x="216" y="147" text-anchor="middle">trials, the newest on the right</text>
+            <text x="216" y="147" text-anchor="middle">trials, latest on the right</text>
           </svg>
           <p class="room-faint" id="movements">{{ said }}</p>
         </template>
       </section>
       <section class="room-card room-log"><h2>Events</h2>
         <div class="room-filter"><label class="room-field">Show <select id="filter" v-model="kind">
-          <option value="">everything</option>
+          <option value="">all events</option>
           <option v-for="k in s.kinds" :key="k">{{ k }}</option></select></label>
           <label class="room-field">Find <input id="find" v-model="find" autocomplete="off"></label></div>
         <div id="events" class="room-scroll" tabindex="0" role="log" aria-label="Events">
-          <p v-if="!listed.length" class="room-faint">Nothing has happened yet that is shown here.</p>
+          <p v-if="!listed.length" class="room-faint">No events to show yet.</p>
           <details v-for="e in listed" :key="e.n" class="room-event" :class="[e.level, e.kind]">
             <summary><time>{{ e.time }}</time> {{ e.text }}</summary><pre>{{ e.raw }}</pre></details>
         </div>
@@ -138,7 +138,7 @@ export default {
     </div>
     <div class="room-column">
       <section class="room-card"><h2>Lateness</h2>
-        <p v-if="!s.late.length" class="room-faint">Shown as soon as the session sends frames.</p>
+        <p v-if="!s.late.length" class="room-faint">Waiting for frames from the session.</p>
         <template v-else><svg class="room-chart small" viewBox="0 0 400 70" role="img"
           :aria-label="s.lateText"><line class="room-limit" x1="0" x2="400" :y1="tick" :y2="tick"/>
           <path class="room-late" :d="lateness"/></svg>
@@ -148,7 +148,7 @@ export default {
             <path :d="trace(one.trace)"/></svg>
           <span><strong>{{ one.label }}</strong> {{ one.words }}</span></div>
       </section>
-      <section class="room-card" id="streams"><h2>Streams of others</h2>
+      <section class="room-card" id="streams"><h2>External streams</h2>
         <p v-if="!s.streams.length" class="room-faint">{{ s.noStreams }}</p>
         <div v-for="one in s.streams" :key="one.label" class="room-stream" :class="one.level">
           <svg viewBox="0 0 90 24" role="img" :aria-label="'rate of ' + one.label">
@@ -161,7 +161,7 @@ export default {
       </section>
       <section class="room-card" id="settings" v-show="s.state !== 'ended'">
         <h2>Cues and sounds</h2>
-        <p v-if="!s.settings.length" class="room-faint">This study has none that can be changed.</p>
+        <p v-if="!s.settings.length" class="room-faint">This study has no settings that can be changed.</p>
         <details v-for="one in s.settings" :key="one.name" open><summary>{{ one.name }}
           <span class="room-faint">{{ one.use }}</span></summary>
           <div v-for="c in one.controls" :key="c.ident" class="room-slider">
@@ -240,10 +240,10 @@ export default {
     said() {
       const { mine, before, cohort } = this.points;
       const unit = this.s.measures.find((m) => m.name === this.measure)?.unit ?? "";
-      const newest = mine.length ? `newest ${this.short(mine.at(-1))} ${unit}` : "no movement yet";
-      const own = before.length ? ` · this person before: ${before.length}` : "";
+      const newest = mine.length ? `latest ${this.short(mine.at(-1))} ${unit}` : "no movement yet";
+      const own = before.length ? ` · this participant earlier: ${before.length}` : "";
       const others = cohort
-        ? ` · cohort of ${cohort[3]}: median ${this.short(cohort[1])} ${unit}, middle half shaded`
+        ? ` · cohort of ${cohort[3]}: median ${this.short(cohort[1])} ${unit}, interquartile range shaded`
         : " · no cohort to compare with yet";
       return newest + own + others;
     },
@@ -258,7 +258,7 @@ export default {
     },
   },
   watch: {
-    words: { deep: true, handler(now) { // outlives that the page is loaded anew, in this tab
+    words: { deep: true, handler(now) { // kept in this tab when the page is reloaded
       const texts = Object.fromEntries(now.map((field) => [field.order, field.text]));
       try { sessionStorage.setItem(this.drafts(), JSON.stringify(texts)); } catch { /* keeps nothing */ }
     } },

@@ -17,7 +17,7 @@ from labcrane.web.room.bars import groups
 from labcrane.web.room.buttons import answers, buttons
 from labcrane.web.room.condition import ExpectedSession, lamp_of, shown_badly, state_of
 from labcrane.web.room.earlier import Earlier
-from labcrane.web.room.sentences import KINDS, sentence
+from labcrane.web.room.sentences import KINDS, held, sentence
 from labcrane.web.room.sliders import sliders
 
 NEWEST = 120
@@ -25,23 +25,23 @@ NEWEST = 120
 
 STATES: Mapping[str, str] = {
     "starting": "Getting ready",
-    "consent": "Waits for consent",
+    "consent": "Waiting for consent",
     "waiting": "Ready to start",
     "paused": "Paused",
     "fault": "Stopped by a fault",
     "break": "Break",
-    "fixation": "Eye tracker's check",
+    "fixation": "Eye tracker check",
     "questionnaire": "Questionnaire",
     "decision": "A decision is needed",
-    "judgement": "Waits for your judgement",
+    "judgement": "Waiting for your judgement",
     "between": "Between two steps",
     "ended": "Ended",
 }
-"""What is said large of each state; of a running trial, its name is."""
+"""The large heading for each state; for a running trial it is the trial's name."""
 
 
 class Snapshot:
-    """Puts together what the page shows."""
+    """Builds the content of the page."""
 
     def __init__(self, context: PageContext, earlier: Earlier) -> None:
         self._context = context
@@ -72,8 +72,7 @@ class Snapshot:
         context = self._context
         session, plan = context.session, context.plan
         state = state_of(session)
-        holds = ", ".join(sorted(session.standing.holds))
-        held = f" · HELD by {holds}" if holds else ""
+        holds = "".join(f" · {held(by)}" for by in sorted(session.standing.holds))
         trouble = context.shown.trouble or context.live.trouble
         lamp = lamp_of(session, context.live, self._expected, trouble)
         return {
@@ -84,7 +83,7 @@ class Snapshot:
             ])),
             "state": state,
             "now": self._running() if state == "running" else STATES.get(state, ""),
-            "stage": session.text + held,
+            "stage": session.text + holds,
             "next": self._next(),
             "facts": " · ".join(self._facts()),
             "left": self._left(state),
@@ -141,7 +140,7 @@ class Snapshot:
     def _next(self) -> str:
         session, plan = self._context.session, self._context.plan
         if session.over:
-            return "nothing: the session is over"
+            return "nothing: the session has ended"
         if session.trials_done < len(plan.trials):
             running = session.trial.get("trial") if session.trial else None
             left = [one for one in plan.trials[session.trials_done :] if one.number != running]
@@ -221,11 +220,11 @@ class Snapshot:
         ]
 
     def _without_streams(self) -> str:
-        """Return what stands where no stream of others is listed."""
+        """Return the text for an empty list of external streams."""
         asked = ", ".join(self._expected.streams)
         if asked:
-            return f"Nothing is known yet of the study's streams: {asked}."
-        return "The study records no streams of others."
+            return f"Waiting for the study's streams: {asked}."
+        return "This study records no external streams."
 
     def _settings(self) -> list[dict[str, Any]]:
         study, changed = self._context.study, self._context.session.settings
@@ -297,7 +296,7 @@ def _stream(stream: Mapping[str, Any], trace: list[float | None]) -> dict[str, A
     if rate is not None:
         words.append(f"{rate:.0f} Hz" + (f" of {nominal:g}" if nominal else ""))
     if stream.get("rtt_s") is not None:
-        words.append(f"clock asked in {1000 * stream['rtt_s']:.1f} ms")
+        words.append(f"clock round trip {1000 * stream['rtt_s']:.1f} ms")
     return {
         "label": stream["label"], "level": level, "words": ", ".join(words),
         "trace": trace, "lines": [*stream["warnings"], *faults],
@@ -306,7 +305,7 @@ def _stream(stream: Mapping[str, Any], trace: list[float | None]) -> dict[str, A
 
 
 def asked(study: Study) -> list[dict[str, str]]:
-    """Return what ``labcrane check`` asks of a study, by the idents of the page's lines."""
+    """Return the warnings of ``labcrane check`` for a study, by the idents of the page's lines."""
     found = []
     for question in questions(study):
         said = about(study, question)

@@ -262,7 +262,7 @@ class Reader:
         said = f"{given.version}, {given.date}" if given else "none"
         level = "ok" if given or not sat else "bad"
         if given and version is not None and given.version != version:
-            said, level = f"{said}: to an earlier text than {version}", "warn"
+            said, level = f"{said}: for an earlier text than {version}", "warn"
         return Person(
             name, status, why, entry.group, said, level, sat, notes=tuple(entry.notes), bytes=held
         )
@@ -286,7 +286,7 @@ class Reader:
 
     def _approval(self, today: date) -> str:
         if self.protocol is None:
-            return "no protocol beside the data: the plan is that of the newest recording"
+            return "no protocol in the folder of the data: the plan is from the latest recording"
         if not lock_path(self.protocol).is_file():
             return f"{self.protocol.name} has no approval"
         lock = read_lock(self.protocol)
@@ -336,7 +336,7 @@ def _quality(
         levels.append(LEVELS[Verdict(verdict)])
     streams = syncs[syncs["session"] == number] if len(syncs) else syncs
     if len(streams):
-        said.append(f"time stamps of {len(streams)} streams of others: {verdict or 'not judged'}")
+        said.append(f"timestamps of {len(streams)} external streams: {verdict or 'not judged'}")
         if lost := streams[streams["corrected"] == "no"]["stream"].tolist():
             levels.append("bad")
             said.append(f"not on the session's clock: {', '.join(map(str, lost))}")

@@ -10,7 +10,7 @@ from labcrane.web.study.overview import Due, Overview, Person
 
 PAGE = Path(__file__).with_name("study.html")
 MARKS = {"ok": "✓", "warn": "!", "bad": "✕"}
-WORDS = {"ok": "in order", "warn": "look", "bad": "not usable as it is"}
+WORDS = {"ok": "in order", "warn": "review", "bad": "not usable"}
 DUE = {"overdue": "bad", "due": "ok", "later": "faint"}
 """How the page colours what is due."""
 
@@ -67,7 +67,7 @@ def _figures(overview: Overview) -> Iterator[tuple[str, str, str, str]]:
     beside = f"; {others} simulated or pilot, not counted" if others else ""
     yield "complete", f"{complete} of {len(real)}", f"participants{beside}", ""
     yield "due", str(len(overview.due)), f"{overdue} overdue", "warn" if overdue else ""
-    yield "sessions", str(sessions), f"{doubtful} to look at", "warn" if doubtful else ""
+    yield "sessions", str(sessions), f"{doubtful} to review", "warn" if doubtful else ""
     yield "disk", size(overview.used), f"{size(overview.free)} free{lasts}", "bad" if full else ""
 
 

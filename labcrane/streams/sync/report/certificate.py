@@ -132,7 +132,7 @@ def corrections(quality: Quality) -> list[str]:
         done.append(f"{quality.disordered} samples came out of order and kept their own times")
     if quality.moved_max_s > 0.0:
         done.append(
-            f"evening moved 95 % of the samples by less than {1e3 * quality.moved_p95_s:.3f} ms, "
+            f"dejittering moved 95 % of samples by less than {1e3 * quality.moved_p95_s:.3f} ms, "
             f"the furthest by {1e3 * quality.moved_max_s:.3f} ms"
         )
     return done
@@ -141,8 +141,8 @@ def corrections(quality: Quality) -> list[str]:
 def unknowable(quality: Quality) -> str:
     """Return what no software can know of the stamps."""
     if np.isnan(quality.hidden_s):
-        return "without probes nothing bounds how far its clock is off"
+        return "without probes the error of its clock is unbounded"
     return (
         f"a lasting asymmetry of the network may hide {1e3 * quality.hidden_s:.3f} ms, half of the "
-        "shortest round trip; what happens in the device before it stamps is its maker's to say"
+        "shortest round trip; ask the maker about delays in the device before the timestamp"
     )

@@ -97,7 +97,7 @@ def uncorrected_stream(recorded: RecordedStream, why: str) -> StreamReport:
     finding = Finding(
         Verdict.FAIL,
         f"its clock could not be corrected: {why}",
-        "its times are those that came with it; correct again when it is mended: labcrane resync",
+        "its times are uncorrected; after mending the cause, run labcrane resync",
     )
     return StreamReport(
         header.name,
@@ -123,7 +123,7 @@ def _probed_in_full(recorded: RecordedStream) -> bool:
 
 UNWRITTEN = (
     "the round trips of its probes were not recorded: a lasting asymmetry of the network may hide "
-    "half of the shortest one, whatever that was"
+    "half of the shortest round trip, which is unknown"
 )
 IF_ITS_OWN = ", if they are of the clock that was probed, which nothing shows"
 
@@ -171,18 +171,18 @@ def _flow(nominal: float, samples: int, quality: Quality, limits: Limits) -> lis
                 Verdict.WARN,
                 f"its rate changed from {quality.first_rate_hz:.3f} to {quality.last_rate_hz:.3f} "
                 "Hz",
-                "its stamps were not made even; let the device warm up before you record",
+                "its timestamps were not dejittered; let the device warm up before you record",
             )
         _add(
             found,
             limits.gap_s.judge(quality.longest_gap_s),
             f"{quality.gaps} gaps, the longest {quality.longest_gap_s:.3f} s",
-            "check the device's cable, radio link and battery; leave out the trials they touch",
+            "check the device's cable, radio link and battery; exclude the affected trials",
         )
     _add(
         found,
         limits.missing.judge(quality.dropped / (samples + quality.dropped)),
-        f"{quality.dropped} samples are missing, by its counter or between its stamps",
+        f"{quality.dropped} samples are missing, by its counter or by its timestamps",
         "check the link between device and its program",
     )
     return found
@@ -192,22 +192,22 @@ def _stamping(quality: Quality, limits: Limits) -> list[Finding]:
     """Judge how samples were stamped and sent."""
     found: list[Finding] = []
     if quality.whose == "receiver":
-        text = "its stamps are of this computer's clock already, while its own was probed"
-        _add(found, Verdict.FAIL, text, "let its program push LSL's stamps as they are")
+        text = "its timestamps are from this computer's clock already, but its own clock was probed"
+        _add(found, Verdict.FAIL, text, "let its program push LSL's timestamps unchanged")
     elif quality.whose == "foreign":
-        text = f"its stamps are of a clock that LSL does not know ({quality.lag_s:.3f} s off)"
+        text = f"its timestamps are from a clock that LSL does not know ({quality.lag_s:.3f} s off)"
         _add(found, Verdict.FAIL, text, "its program must stamp with LSL's clock, not its own")
     elif not np.isnan(quality.lag_s):
         _add(
             found,
             limits.lag_s.judge(abs(quality.lag_s)),
-            f"its stamps lie {quality.lag_s:.3f} s before their arrival",
+            f"its timestamps are {quality.lag_s:.3f} s before their arrival",
             "its program may stamp with a clock of its own: let it use LSL's",
         )
     if quality.ahead_s:
-        text = f"it is stamped up to {1e3 * quality.ahead_s:.1f} ms ahead: with what was to come, "
+        text = f"it is stamped up to {1e3 * quality.ahead_s:.1f} ms ahead: with a future time, "
         text += "or by a clock that is ahead"
-        advice = "right if its program stamps with the flip to come; compare it with a photodiode"
+        advice = "correct if its program stamps with the coming flip; compare it with a photodiode"
         _add(found, Verdict.WARN, text, advice)
     found += _order(quality)
     if quality.stalls:
@@ -216,15 +216,17 @@ def _stamping(quality: Quality, limits: Limits) -> list[Finding]:
             Verdict.WARN,
             f"{quality.stalls} times it stalled and sent late, by {quality.longest_stall_s:.1f} s "
             "at most",
-            "its times are right; feedback that used it was late: look what kept its program",
+            "its times are correct; feedback that used it was late: find what delayed its program",
         )
     if quality.shifts:
-        text = f"{quality.shifts} times its stamps were shifted, by {1e3 * quality.shift_s:.0f} ms "
+        text = f"{quality.shifts} times its timestamps shifted, by {1e3 * quality.shift_s:.0f} ms "
         text += "at most: it paused, or its delay changed"
-        _add(found, Verdict.WARN, text, "what is later may be late by that, and is not moved")
+        _add(
+            found, Verdict.WARN, text, "later samples may be late by that much; they are not moved"
+        )
     if quality.grid_s:
         unit = f"{1e3 * quality.grid_s:g} ms"
-        text = f"its stamps are cut to {unit}, so that half of that is in their uncertainty"
+        text = f"its timestamps are cut to {unit}; their uncertainty includes half of that"
         _add(found, Verdict.WARN, text, "let its program stamp with LSL's clock at full resolution")
     found += _scatter(quality, limits)
     return found
@@ -237,11 +239,11 @@ def _scatter(quality: Quality, limits: Limits) -> list[Finding]:
         text = f"chunks are stamped when they are sent ({1e3 * quality.noise_s:.1f} ms of scatter)"
         _add(found, Verdict.WARN, text, "measure the delay and give it as latency_s or min_delay_s")
     elif quality.noise_s:
-        text = f"its stamps scatter by {1e3 * quality.noise_s:.2f} ms about its samples"
+        text = f"its timestamps scatter by {1e3 * quality.noise_s:.2f} ms about its samples"
         _add(found, Verdict.WARN, text, "let its program stamp with LSL's clock at full resolution")
     elif quality.uneven_s > limits.error_s.warn / FURTHEST:
-        text = f"its stamps lie up to {1e3 * quality.uneven_s:.2f} ms beside an even count, and "
-        text += "arrive so: its samples are uneven, or late by as much, which nothing tells"
+        text = f"its timestamps are up to {1e3 * quality.uneven_s:.2f} ms off a regular grid, and "
+        text += "arrive so: its samples are irregular, or late by as much; both look alike"
         _add(found, Verdict.WARN, text, "if its sampler is steady, let its program stamp sooner")
     return found
 
@@ -250,22 +252,24 @@ def _order(quality: Quality) -> list[Finding]:
     """Judge whether samples come one after the other."""
     found: list[Finding] = []
     if quality.backward and not quality.disordered:
-        text = f"{quality.backward} samples are placed before one that came earlier: sent late or "
+        text = (
+            f"{quality.backward} samples are placed before one that arrived earlier: sent late or "
+        )
         text += "again, its buffer changed, or its clock was set back"
-        _add(found, Verdict.WARN, text, "leave out the trials they are in; look at its program")
+        _add(found, Verdict.WARN, text, "exclude the trials they are in; check its program")
     if quality.disordered:
         text = f"{quality.disordered} samples came out of order"
-        _add(found, Verdict.WARN, text, "sort by time before you use them; look why they overtake")
+        _add(found, Verdict.WARN, text, "sort by time before you use them; find why they overtake")
     if quality.frozen:
-        text = f"{quality.frozen} samples have the stamp of the one before"
-        _add(found, Verdict.WARN, text, "leave out the trials they are in; look at its program")
+        text = f"{quality.frozen} samples have the timestamp of the one before"
+        _add(found, Verdict.WARN, text, "exclude the trials they are in; check its program")
     if quality.strayed:
-        text = f"{quality.strayed} samples are stamped beside their even count for a while: a "
-        text += "clock stood still and caught up, or its sampler waited"
+        text = f"{quality.strayed} samples leave their regular grid for a while: a "
+        text += "clock stopped and caught up, or its sampler waited"
         _add(found, Verdict.WARN, text, "give a virtual machine a core of its own, or none")
     if quality.repeated:
-        text = f"{quality.repeated} samples were sent again, with the stamp that they had"
-        _add(found, Verdict.WARN, text, "leave them out before you filter or average it")
+        text = f"{quality.repeated} samples were sent again with the same timestamp"
+        _add(found, Verdict.WARN, text, "remove them before you filter or average it")
     return found
 
 
@@ -274,7 +278,7 @@ def _died(quality: Quality, nominal: float, *, required: bool) -> Finding:
     return Finding(
         Verdict.FAIL if required else Verdict.WARN,
         f"it died: no {what} in the last {quality.silent_s:.0f} s",
-        "leave out the trials after its last sample; look at its program and its battery",
+        "exclude the trials after its last sample; check its program and its battery",
     )
 
 
@@ -282,7 +286,7 @@ def _changes(quality: Quality) -> list[Finding]:
     """Name what happened to its clock and on the way to it."""
     found: list[Finding] = []
     for count, what, advice in (
-        (quality.steps, "its clock jumped {} times", "look what sets its computer's clock"),
+        (quality.steps, "its clock jumped {} times", "find what sets its computer's clock"),
         (quality.sleeps, "its computer slept {} times", "switch off its power saving"),
         (quality.slews, "a clock was slewed {} times", "switch off NTP while you record"),
         (
@@ -294,8 +298,13 @@ def _changes(quality: Quality) -> list[Finding]:
         if count:
             _add(found, Verdict.WARN, what.format(count), f"corrected; {advice}")
     if quality.congested_s > CONGESTED_S:
-        text = f"probes were held up for {quality.congested_s:.0f} s"
-        _add(found, Verdict.WARN, text, "trusted less by as much; keep the network for the study")
+        text = f"probes were delayed for {quality.congested_s:.0f} s"
+        _add(
+            found,
+            Verdict.WARN,
+            text,
+            "the uncertainty includes it; reserve the network for the study",
+        )
     return found
 
 
@@ -341,41 +350,41 @@ def _certainty(quality: Quality, limits: Limits) -> list[Finding]:
         found,
         limits.error_s.judge(quality.error_p95_s),
         f"its times may be off by {1e3 * quality.error_p95_s:.2f} ms",
-        f"they carry {carries(quality)}",
+        f"they are accurate enough for {carries(quality)}",
     )
     if not quality.error_p95_s > limits.error_s.warn and quality.worst_s > limits.error_s.warn:
         text = (
             f"its times may be off by {1e3 * quality.worst_s:.2f} ms in the second from "
             f"{quality.worst_at_s:.0f} s"
         )
-        _add(found, Verdict.WARN, text, "leave out the trial it is in where milliseconds matter")
+        _add(found, Verdict.WARN, text, "exclude the trial it is in if milliseconds matter")
     if quality.unprobed and not quality.whose:
         _add(
             found,
             Verdict.FAIL,
-            f"{quality.unprobed} samples are of a clock that was never probed",
-            "leave them out where milliseconds matter: they are placed by their arrival",
+            f"{quality.unprobed} samples are from a clock that was never probed",
+            "exclude them if milliseconds matter: they are placed by their arrival",
         )
     if quality.unsure:
         _add(
             found,
             Verdict.WARN,
             f"{quality.unsure} samples are near a step of the clock and may be of either side",
-            "leave out the trial they are in where milliseconds matter",
+            "exclude the trial they are in if milliseconds matter",
         )
     return found
 
 
 def _unwritten(recorded: RecordedStream) -> list[Finding]:
-    """Tell what another recorder has not written down, and what nobody can know without it."""
+    """Report what another recorder did not write, and what stays unknown without it."""
     found: list[Finding] = []
     if len(recorded.time_raw) and not len(recorded.arrivals):
-        text = "when its samples came was not recorded, so that nothing shows whose clock their "
-        text += "stamps are of, or how late they are"
-        _add(found, Verdict.WARN, text, "compare it with an event that another stream has as well")
+        text = "its arrival times were not recorded, so nothing shows from which clock its "
+        text += "timestamps are, or how late they are"
+        _add(found, Verdict.WARN, text, "compare it with an event that another stream contains too")
     if len(recorded.offsets) and not len(recorded.probes):
-        text = f"how long its clock probes took was not recorded; {1e3 * ASSUMED_RTT_S:g} ms was "
-        text += "assumed, and a slower way hides more"
+        text = f"its clock probes' round trips were not recorded; {1e3 * ASSUMED_RTT_S:g} ms is "
+        text += "assumed, and a slower network hides more"
         _add(found, Verdict.WARN, text, "measure the round trip between the two computers")
     return found
 
@@ -389,16 +398,16 @@ def _noted(recorded: RecordedStream) -> list[Finding]:
             found,
             Verdict.WARN,
             f"its program was restarted {resets} times",
-            "corrected; look why it stopped",
+            "corrected; find why it stopped",
         )
     rest = set[int]()
     for note in recorded.notes:
         if note.data.get("event") == UNSTAMPED:
             rest |= set(range(*note.data["samples"]))
     if rest:
-        text = f"{len(rest)} samples came without a stamp: a recorder connected in the middle of a "
-        text += "chunk; theirs are worked back from the next chunk's, a period each"
-        _add(found, Verdict.WARN, text, "leave out the trial they are in, if it is one")
+        text = f"{len(rest)} samples came without a timestamp: a recorder connected in a "
+        text += "chunk under way; theirs are extrapolated from the next chunk, one period each"
+        _add(found, Verdict.WARN, text, "exclude the trial they are in, if there is one")
     for text in {str(note.data["text"]) for note in recorded.notes if _is_warning(note.data)}:
         _add(found, Verdict.WARN, text.partition(": ")[0], text.partition(": ")[2] or "correct it")
     return found

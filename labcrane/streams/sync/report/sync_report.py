@@ -132,8 +132,8 @@ def judge_loop(
         text = f"{late} of {len(due)} ticks woke more than {1e3 / rate_hz:.1f} ms late"
         findings.append(Finding(verdict, text, "close other programs, or lower the rate"))
     if dropped:
-        text = f"{dropped} ticks are missing in the record"
-        findings.append(Finding(Verdict.FAIL, text, "run labcrane recover and read what it says"))
+        text = f"{dropped} ticks are missing from the record"
+        findings.append(Finding(Verdict.FAIL, text, "run labcrane recover and read its output"))
     p50, p99, most = np.quantile(lateness, (0.5, 0.99, 1.0)) if len(due) else (np.nan,) * 3
     verdict = worst(finding.verdict for finding in findings)
     return LoopReport(
