@@ -21,7 +21,7 @@ MOST_BYTES = LIMITS["message to a session"].most
 
 
 class Order(StrEnum):
-    """Everything that can be asked of a running session."""
+    """Every action that a running session accepts."""
 
     START = "start"  # begin the step that waits, or go on after a pause
     PAUSE = "pause"
@@ -36,7 +36,7 @@ class Order(StrEnum):
     ANSWER = "answer"  # to a question, as JSON: questionnaire, item, value
     SUBMIT = "submit"  # hand in the questionnaire that is asked
     CONSENT = "consent"  # to the text of this version, given before the session begins
-    DENIED = "denied"  # said by a page: somebody without the right asked for something
+    DENIED = "denied"  # from a page: a request without the right to make it
     SETTING = "setting"  # change a setting of a cue or sound: tone.far=3
     TAKE = "take"  # a stream that only its type asks for: eeg, eeg=amplifier-1 or eeg=none
 
@@ -85,7 +85,7 @@ class Completion:
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
-    """Somebody has seen something that the running task asks about."""
+    """A sighting of something that the running task asks about."""
 
     what: str
 
@@ -120,7 +120,7 @@ class ConsentGiven:
 
 @dataclass(frozen=True, slots=True)
 class Denial:
-    """Somebody was refused something before it came here."""
+    """A request was refused before it reached the session."""
 
     why: str
 
@@ -182,7 +182,7 @@ def read_request(command: Command) -> Request:
 
 @dataclass(frozen=True, slots=True)
 class StreamLost:
-    """A stream of somebody else, or the recorder of all, has failed."""
+    """An external stream, or the recorder of all of them, has failed."""
 
     what: str
     kind: Literal["stream lost"] = "stream lost"
@@ -198,7 +198,7 @@ class StreamBack:
 
 @dataclass(frozen=True, slots=True)
 class StreamConfirmed:
-    """Somebody has said which stream of its type is meant: ``which``, in words."""
+    """A stream of a type was chosen: ``which``, in words."""
 
     what: str
     which: str
@@ -233,7 +233,7 @@ class FeedbackLost:
 
 @dataclass(frozen=True, slots=True)
 class FeedbackReady:
-    """A view or sound presents; ``facts`` is what it says of itself."""
+    """A view or sound presents; ``facts`` is its own metadata."""
 
     what: str
     facts: str = ""
@@ -245,7 +245,7 @@ class FeedbackReady:
 
 @dataclass(frozen=True, slots=True)
 class LauncherGone:
-    """The launcher has died: nobody could stop the session any more, so it ends."""
+    """The launcher has died: the session could no longer be stopped, so it ends."""
 
     kind: Literal["launcher gone"] = "launcher gone"
 
@@ -325,14 +325,14 @@ def beyond_limits(command: Command) -> str | None:
 
 
 class Console(Protocol):
-    """Whoever gives orders and looks on: the terminal and the pages, or a simulation."""
+    """A source of actions that also follows events: terminal and pages, or a simulation."""
 
     def commands(self) -> Sequence[Message]:
         """Return what was said since the last call, without waiting."""
         ...
 
     def report(self, event: Event) -> None:
-        """Be told of an event, without making the session wait."""
+        """Receive an event without making the session wait."""
         ...
 
 

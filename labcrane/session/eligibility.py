@@ -50,7 +50,7 @@ def check_eligibility(visit: Visit, today: date | None = None) -> Admission:
     ------
     ProtocolError
         The study is not what was approved, or the packages are not and the protocol refuses that,
-        the lock was written anew by hand, the approval has expired, the participant is not in the
+        the lock was rewritten by hand, the approval has expired, the participant is not in the
         register, has not consented to the approved text, was excluded, or comes too early or late.
     """
     if visit.simulated or visit.pilot:

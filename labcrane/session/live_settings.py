@@ -14,7 +14,7 @@ from labcrane.session.commands import SettingChange
 
 
 class FeedbackSettings:
-    """What the examiner may change, and what it stands at.
+    """Settings that the experimenter may change, and their present values.
 
     A change is written as in a protocol: ``tone.far=3``, ``ball.at=tip``.
     """

@@ -1,4 +1,4 @@
-"""Metadata written at the start of a recording for whoever reads it."""
+"""Metadata written at the start of a recording, for its readers."""
 
 import hashlib
 import platform
@@ -99,7 +99,7 @@ def _of_visit(visit: Visit, plan: SessionPlan) -> dict[str, Any]:
 
 
 def _of_judgement(visit: Visit) -> dict[str, Any]:
-    """Return whether tests wait to be judged: where somebody is there, and there is an indicator.
+    """Return whether tests wait to be judged: with an experimenter and an indicator.
 
     Without a time of reference there is none, and nothing to judge.
     """
@@ -109,7 +109,7 @@ def _of_judgement(visit: Visit) -> dict[str, Any]:
 
 
 def _of_study(study: Study, *, simulated: bool) -> dict[str, Any]:
-    """Return the study as it is run: all that it is made of, and what it says of the data."""
+    """Return the study as it is run: all its parts, and its description of the data."""
     folder = study.path.parent
     choices = study.choices | ({"input": study.operator} if simulated else {})
     return {

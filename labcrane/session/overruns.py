@@ -1,4 +1,4 @@
-"""Overruns: components that take longer than a tick has, and are told of.
+"""Overruns: reports of components that take longer than a tick.
 
 Whether one computed for so long, or waited while another program had the processor, is told apart.
 """
@@ -12,7 +12,7 @@ FEW = 3
 """Overruns of one method within a second that may be the computer's: another process had it."""
 
 AGAIN_S = 60.0
-"""A component that stays slow is told of this often."""
+"""Seconds between two reports of a component that stays slow."""
 
 
 class OverrunReporter:

@@ -1,4 +1,4 @@
-"""Pause of a session: held by the examiner, a part in trouble, or a stop rule."""
+"""Pause of a session: by the experimenter, a fault, or a stop rule."""
 
 from collections.abc import Callable, Iterable
 
@@ -20,7 +20,7 @@ INPUT, DISK = "input", "disk"
 
 
 class Suspenders:
-    """Holds a session while somebody or something has a reason to.
+    """Holds a session while a person or a fault has a reason to.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Suspenders:
             self.release(part)
 
     def report(self, report: ProcessReport) -> None:
-        """Take up what the launcher says of another process."""
+        """Process the launcher's report about another process."""
         match report:
             case StreamLost(what):
                 self._note("stream.lost", {"what": what})

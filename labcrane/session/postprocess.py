@@ -39,7 +39,7 @@ NO_SPACES: Mapping[str, str] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class _Read:
-    """A stream as the file holds it, and what the study says of it."""
+    """A stream as the file contains it, and the study's entry for it."""
 
     group: "h5py.Group"
     recorded: RecordedStream
@@ -56,7 +56,7 @@ def conclude(group: "h5py.Group", spaces: Mapping[str, str] = NO_SPACES) -> Sync
     Parameters
     ----------
     spaces
-        What gaze streams are in, by the names of their groups, as somebody declares it afterwards.
+        Spaces of gaze streams, by the names of their groups, as declared after the recording.
     """
     context = json.loads(text_of(group["context"]))
     needs = {
@@ -96,7 +96,7 @@ def _read(group: "h5py.Group", needs: dict[str, StreamNeed]) -> _Read:
 
 
 def _end(group: "h5py.Group", raws: Sequence[RawStream]) -> float | None:
-    """Return when the recording ended: the last that anything in it tells of, on our clock."""
+    """Return when the recording ended: the last time that it contains, on our clock."""
     lasts = [float(group["time"][-1])] if len(group["time"]) else []
     lasts += [float(raw.arrivals[-1, 1]) for raw in raws if len(raw.arrivals)]
     lasts += [float(raw.probes[:, 3].max()) for raw in raws if len(raw.probes)]
@@ -119,7 +119,7 @@ def _corrected(one: _Read, raw: RawStream, end: float | None, limits: Limits) ->
 
 
 def _write_space(one: _Read, spaces: Mapping[str, str]) -> None:
-    """Write what a gaze stream is in, where somebody says it; what was said last holds."""
+    """Write a gaze stream's space if it is declared; the last declaration holds."""
     said = spaces.get(one.group.name.rpartition("/")[2])
     if said is None and "space" not in one.group.attrs and one.need is not None:
         said = one.need.space

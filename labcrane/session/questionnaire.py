@@ -70,7 +70,7 @@ class QuestionnaireForm:
         kept = json.dumps(self._answers, ensure_ascii=False)
         about = {**self._about, "title": self._questionnaire.title, "kept": kept}
         items = list(self._items.values())
-        if any(item.card for item in items):  # whoever shows it follows the record
+        if any(item.card for item in items):  # pages follow the order in the record
             shown = shuffled(items, self._seed)
             about["order"] = " ".join(item.name for item in shown)
             about["turned"] = " ".join(item.name for item in shown if item not in items)
@@ -121,7 +121,7 @@ class QuestionnaireForm:
         return dict(self._questionnaire.score(self._answers))
 
     def simulated(self, seed: int, known: Mapping[str, Value]) -> Iterator[Said]:
-        """Yield the answers of somebody who says what is known, the rest at random; hand it in."""
+        """Yield simulated answers: the known ones, the rest at random; then submit."""
         dice = random.Random(seed)  # noqa: S311 - nothing secret
         for item in self._items.values():
             drawn = _any(item, dice)  # always, so that one that is known does not change the others
@@ -229,7 +229,7 @@ class QuestionnaireRun:
             yield from self._form.simulated(self._seed, self._known)
 
     def handle(self, request: AnswerGiven | Submission, about: Mapping[str, Value]) -> Said:
-        """Take an answer, or hand the questionnaire in; return what is said of it.
+        """Take an answer, or submit the questionnaire; return the events about it.
 
         ``about`` is by whom it was given, and from which address.
         """
@@ -243,7 +243,7 @@ class QuestionnaireRun:
     def end(self, *, skipped: bool) -> Iterator[Said]:
         """Yield what is said at its end: that it was left, and the stop rules that it meets.
 
-        One that was left and not skipped is owed: the session has ended.
+        One that was left but not skipped remains to be done: the session has ended.
         """
         if not self.over:
             yield self._form.leave(done=skipped)

@@ -1,8 +1,8 @@
-"""Progress of a session, and what it still owes: for going on after any stop.
+"""Progress of a session and what remains of it, to continue after any stop.
 
-Nothing is written for this alone. What a session owes is worked out from its plan and the events in
-its journal, by the same fold while it runs and afterwards; so a session that was killed reads like
-one that was ended by order.
+Nothing is written for this alone. The remaining trials are derived from the plan and the events in
+the journal, by the same fold while the session runs and afterwards; so a session that was killed
+reads like one that was ended by an action.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -36,17 +36,17 @@ BROKEN = frozenset({Phase.ENDED, Phase.INTERRUPTED})
 """How an attempt ends that the session stopped in the middle of."""
 
 COMPLETE, INCOMPLETE = "complete", "incomplete"
-"""Why a session ended that nobody ended: it owes nothing, or what the policy gave up."""
+"""Why a session ended by itself: nothing remains, or only trials that the policy abandoned."""
 
 RECORD = TableNumbers()
 
 KILLED = "its process died"
-"""How a session stopped that has said nothing of an end."""
+"""How a session stopped whose journal has no end."""
 
 
 @dataclass
 class Progress:
-    """What a session's events say of how far it came.
+    """How far a session came, from its events.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Progress:
     begun
         What was said at the start of every trial, by trial number.
     interrupted
-        What was said of the trial that was under way when the process died; None between trials.
+        Data of the trial that was under way when the process died; None between trials.
     angles
         Last joint angles in rad, shape ``(n_joints,)``; empty when there is no frame.
     time
@@ -77,16 +77,16 @@ class Progress:
     rated, ratings
         The same of what is asked after trials, by trial and questionnaire.
     held
-        Who of the people in the room held it: the examiner, a stop rule.
+        Who held it: the experimenter, a stop rule.
     responses
         What every trial told its track, by trial number, in the order in which they ended.
     carried
         What trials of earlier sessions told their tracks.
     judged
-        Whether the session waits for the supervisor to judge its tests.
+        Whether the session waits for the experimenter to judge its tests.
     unjudged
-        What was said at the end of the test that ended last, if the session still owes the
-        supervisor time to judge it; None otherwise.
+        Data at the end of the last test, if the experimenter can still judge it; None
+        otherwise.
     """
 
     stop: str = KILLED
@@ -206,7 +206,7 @@ def judged_in(context: Mapping[str, Any]) -> bool:
 
 
 def is_open(ended: Mapping[str, Value]) -> bool:
-    """Whether a trial is a test whose completion factor nobody has set, by its ``trial.end``.
+    """Whether a trial is a test without a completion factor, by its ``trial.end``.
 
     A test counts for the performance indicator: it has the columns from which that is worked out,
     and is neither practice nor reference.
@@ -249,7 +249,7 @@ def progress(journal: Path, joints: Sequence[str]) -> Progress:
     Raises
     ------
     ProtocolError
-        There is no such journal, so there is nothing to go on with.
+        There is no such journal, so there is nothing to continue.
     RecordingError
         An event in it does not say what such an event says: labcrane has not written it.
     """
@@ -338,7 +338,7 @@ def _about(block: PlannedBlock, trial: Trial, said: Mapping[str, Any]) -> dict[s
 
 
 class Ledger:
-    """Keeps account of what a session owes, event by event.
+    """Keeps account of what remains of a session, event by event.
 
     Parameters
     ----------
@@ -355,7 +355,7 @@ class Ledger:
         self.take = self._so_far.take
 
     def owed(self) -> SessionPlan:
-        """Return what is still owed, given up or not."""
+        """Return what remains, including abandoned trials."""
         return remaining(self._study, self._whole, self._so_far, "redo_trial")
 
     def chosen(self, block: PlannedBlock, trial: Trial) -> Trial | None:
@@ -370,7 +370,7 @@ class Ledger:
 
     @property
     def unjudged(self) -> dict[str, Value]:
-        """Trial and attempt of the test that the supervisor is to be given time for, if any."""
+        """Trial and attempt of the test that waits for the experimenter's judgement, if any."""
         ended = self._so_far.unjudged
         return {} if ended is None else {name: ended[name] for name in ("trial", "attempt")}
 
@@ -402,7 +402,7 @@ def remaining(study: Study, plan: SessionPlan, so_far: Progress, policy: Policy)
 def _ended_practices(plan: SessionPlan, steps: Sequence[PlannedStep]) -> Iterator[PlannedStep]:
     """Yield steps that are left, where the last round that is left of a practice ends it.
 
-    The rounds behind it are needed no more; without this the next practice would go on with it.
+    The rounds after it are no longer needed; without this the next practice would continue it.
     """
     practice: dict[int, int] = {}
     number = 0
@@ -515,7 +515,7 @@ def _owed(block: PlannedBlock, so_far: Progress) -> Iterator[OwedQuestionnaire]:
 
 
 def resumption(plan: SessionPlan, so_far: Progress, policy: Policy) -> dict[str, Value]:
-    """Return what the record says of a resumption: how it stopped, what is owed and repeated.
+    """Return the record of a resumption: how it stopped, what remains and what is repeated.
 
     ``void`` are the trials that were done and are redone with their block.
     """

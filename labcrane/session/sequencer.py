@@ -55,7 +55,7 @@ class Sequencer:
     awaits
         The views and sounds that must present before the first step begins.
     ledger
-        Keeps account of what the session owes when it ends; of ``plan`` unless it was resumed.
+        Keeps account of what remains when the session ends; of ``plan`` unless it was resumed.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Sequencer:
         self.over = False
         self._frame: Frame | None = None
         self._script = self._session()
-        next(self._script, None)  # a session that owes nothing ends at its first tick
+        next(self._script, None)  # a session with nothing left ends at its first tick
 
     @property
     def step(self) -> int:
@@ -219,7 +219,7 @@ class Sequencer:
         self._enter()
 
     def _wished_on(self) -> bool:
-        """Whether somebody wants to go on to what comes next, or to end."""
+        """Whether a request to skip to the next step, or to end, has come."""
         return Order.SKIP in self._wishes or bool(self._held.ending)
 
     def _block(self, block: PlannedBlock) -> Ticks:
@@ -250,7 +250,7 @@ class Sequencer:
             self._note("practice.end", **about, **verdict)
 
     def _judged(self, *, asked: bool = False) -> Ticks:
-        """Give the supervisor time to judge the test that has ended, unless it was judged.
+        """Give the experimenter time to judge the test that has ended, unless it was judged.
 
         A judgement does not end the wait: a slip can be mended, and an end be overridden too.
         There was time already where something was ``asked`` after the test.
@@ -286,7 +286,7 @@ class Sequencer:
             yield from self._trial(block, next_attempt(self._study, self._plan, trial))
 
     def _keep_what_was(self) -> None:
-        """Part the frame of this tick, not yet written, from arrays that a new trial sets anew."""
+        """Part the frame of this tick, not yet written, from arrays that a new trial resets."""
         frame = self._frame
         if frame is not None:
             frame.axes, frame.command = frame.axes.copy(), frame.command.copy()
@@ -419,7 +419,7 @@ class Sequencer:
         self._know(name, data)
 
     def _know(self, name: str, data: Mapping[str, Value]) -> None:
-        """Follow an event, in what the session owes and in where it stands."""
+        """Follow an event, in what remains and in where the session is."""
         self._ledger.take(name, data)
         self._standing = self._standing.after(name, data)
 

@@ -91,7 +91,7 @@ LEAVING_S = 10.0
 
 
 def running(visit: Visit) -> AbstractContextManager[None]:
-    """Let nobody else run a session of this participant: held from its start to its file.
+    """Lock this participant against other sessions, from the start of this one to its file.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def running(visit: Visit) -> AbstractContextManager[None]:
 
 
 def check_free(visit: Visit) -> None:
-    """Make sure that nobody else runs a session of this participant now.
+    """Make sure that no other process runs a session of this participant now.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def check_free(visit: Visit) -> None:
 
 
 def recording(visit: Visit) -> AbstractContextManager[None]:
-    """Let nobody else record this participant; a process whose launcher died is waited for.
+    """Lock this participant against other recordings; wait for a process whose launcher died.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def _sole(visit: Visit, name: str, patience_s: float) -> AbstractContextManager[
     if not visit.resumed:
         folder.make()
     elif not folder.path.is_dir():
-        return nullcontext()  # there is nothing to go on with, which is said elsewhere
+        return nullcontext()  # nothing to continue, which another check reports
     refusal = (
         f"another labcrane is running a session of {folder.name}; wait until it has ended, or end "
         "it, and try again"
@@ -261,7 +261,7 @@ def _watching(visit: Visit, rig: Rig) -> AbstractContextManager[None]:
 
 @contextmanager
 def _scheduled(visit: Visit) -> Iterator[dict[str, Any]]:
-    """Schedule the loop as a visit says; give what the record is to say of it.
+    """Schedule the loop as a visit specifies; yield the metadata for the record.
 
     What real time gains is measured here and now, by a second of an empty loop before and with it.
     """
@@ -278,7 +278,7 @@ def _scheduled(visit: Visit) -> Iterator[dict[str, Any]]:
 
 @contextmanager
 def _awake(visit: Visit) -> Iterator[dict[str, Any]]:
-    """Keep the screen awake while people are recorded; give what the record is to say of it."""
+    """Keep the screen awake while people are recorded; yield the metadata for the record."""
     if visit.simulated:
         yield {}
         return
@@ -322,7 +322,7 @@ def go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:
     Raises
     ------
     ProtocolError
-        It was never begun, was begun by another plan, or owes nothing.
+        It was never begun, was begun with another plan, or nothing remains.
     """
     so_far = progress(visit.journal, visit.study.machine.names)
     check_recorded(whole, so_far)
@@ -347,7 +347,7 @@ def go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:
 
 @dataclass(frozen=True, slots=True)
 class Outlook:
-    """What people are told before a session goes on.
+    """Information for the experimenter before a session continues.
 
     Attributes
     ----------
@@ -365,12 +365,12 @@ class Outlook:
 
 
 def outlook(visit: Visit, admission: Admission) -> Outlook:
-    """Return what people are told before a session goes on.
+    """Return the information for the experimenter before a session continues.
 
     Raises
     ------
     ProtocolError
-        There is nothing to go on with.
+        There is nothing to continue.
     """
     whole = plan_session(visit.study, visit.participant, visit.session, admission.slot)
     so_far, left = go_on(visit, whole)
@@ -389,7 +389,7 @@ def outlook(visit: Visit, admission: Admission) -> Outlook:
 
 
 def still_owed(visit: Visit, admission: Admission) -> str:
-    """Return what a session that was recorded owes, as people count trials; empty for nothing."""
+    """Return what remains of a recorded session, as people count trials; empty for nothing."""
     whole = plan_session(visit.study, visit.participant, visit.session, admission.slot)
     so_far = progress(visit.journal, visit.study.machine.names)
     return owed_text(remaining(visit.study, whole, so_far, "redo_trial"), TrialCounts.of(whole))
@@ -447,7 +447,7 @@ def _outlets(
     run: Run,
     offer: Callable[[Mapping[str, str]], None] | None,
 ) -> Iterator[list[Callable[[Frame], None]]]:
-    if visit.fast:  # its stamps are not the computer's time, so nobody could use the streams
+    if visit.fast:  # its timestamps are not the computer's time, so the streams are useless
         yield []
         return
     from labcrane.streams.context import CONTEXT, ContextOutlet  # noqa: PLC0415

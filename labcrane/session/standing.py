@@ -12,11 +12,11 @@ from typing import Any
 from labcrane.session.commands import Order
 
 EXAMINER, STOP = "examiner", "stop rule"
-"""The people who can hold a session: it goes on when they say so, also after a resumption."""
+"""Holds that only the experimenter can end, also after a resumption."""
 
 
 class SessionStage(StrEnum):
-    """What runs in a session, whoever holds it."""
+    """What runs in a session, whether or not it is held."""
 
     STARTING = "starting"  # nothing has begun: streams and feedback are awaited
     CONSENT = "consent"  # the participant's consent is awaited before it begins
@@ -45,7 +45,7 @@ RUNS: Mapping[str, SessionStage] = {
     ),
     "session.end": SessionStage.ENDED,
 }
-"""What runs after an event that tells so."""
+"""What runs after each of these events."""
 
 SKIPPABLE = {
     SessionStage.TRIAL,
@@ -122,7 +122,7 @@ class Standing:
         return replace(self, stage=stage, what="")
 
     def _held(self, name: str, data: Mapping[str, Any]) -> "Standing":
-        """Return where it stands after somebody held it or let it go, or feedback came."""
+        """Return the standing after a hold or release, or after feedback came."""
         begun = self.at(SessionStage.BETWEEN) if self.stage is SessionStage.STARTING else self
         match name:
             case "pause.start":

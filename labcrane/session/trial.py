@@ -16,7 +16,7 @@ class TrialRun:
     phase
         Where the trial stands.
     about
-        What every event of the trial says of it.
+        Data that every event of the trial contains.
     row
         Its row of the trial table, when it has ended; empty before.
     """

@@ -88,7 +88,7 @@ class Visit:
 
     @property
     def resume_command(self) -> str:
-        """What is typed to go on with it, with every option that it was run with."""
+        """The command that continues it, with every option that it was run with."""
         words = ["labcrane", "resume", str(self.study.path), "--participant", self.participant]
         words += ["--session", str(self.session)]
         if self.data != self.study.path.parent / "data":
@@ -157,8 +157,8 @@ def check_new(visit: Visit) -> None:
 def visit_of(protocol: Path, participant: str, session: int, data: Path, **options: Any) -> Visit:
     """Return a visit of the study in ``protocol``; ``options`` are the visit's other attributes.
 
-    A session that was begun can be gone on with as its protocol was then, whatever would be refused
-    of it today: :attr:`Study.outdated` says what.
+    A session that was begun can be continued with its protocol of then, even if that would be
+    refused today: :attr:`Study.outdated` states why.
 
     Raises
     ------

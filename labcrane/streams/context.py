@@ -2,8 +2,8 @@
 
 A sample of ``labcrane.context`` is a JSON object of two parts: ``scene``, which never changes
 (:func:`labcrane.recording.run_codec.read_run`), and ``situation``
-(:class:`labcrane.core.records.SessionState`). It is sent at every change and once a second: whoever
-starts late, or again, draws from one sample alone.
+(:class:`labcrane.core.records.SessionState`). It is sent at every change and once a second:
+a reader that starts late, or restarts, needs one sample only.
 """
 
 import json
@@ -134,7 +134,7 @@ class ContextOutlet:
 
     @property
     def description(self) -> str:
-        """The stream as XML: whoever has it needs no search."""
+        """The stream as XML: a reader that has it needs no search."""
         return "" if self._outlet is None else str(self._outlet.get_info().as_xml())
 
     def push(self, frame: Frame) -> None:
@@ -161,7 +161,7 @@ class ContextInlet:
     text
         The newest sample as it came; empty before the first.
     situation
-        What it says of the session.
+        The session's present state.
     """
 
     def __init__(self, info: "pylsl.StreamInfo") -> None:

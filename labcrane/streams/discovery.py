@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 ANSWER_S = 2.0
 MOST = 1024
-"""More streams than liblsl tells of."""
+"""More streams than liblsl reports."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,7 +56,7 @@ class FeedbackLog:
 
     @property
     def taken(self) -> bool:
-        """Whether somebody receives all of its streams: what is sent to nobody is lost."""
+        """Whether all of its streams have a receiver: samples without one are lost."""
         return all(samples.taken for samples in self._samples.values())
 
     @property

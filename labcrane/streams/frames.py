@@ -1,4 +1,4 @@
-"""Frames as one LSL stream, for whoever presents them.
+"""Frames as one LSL stream, for the views and sounds that present them.
 
 A sample of ``labcrane.frame`` is everything a frame holds but its events, in float64: the columns
 of :func:`frame_columns`, in order. Its time is the time the tick was due.
@@ -42,7 +42,7 @@ class FrameOutlet:
 
     @property
     def description(self) -> str:
-        """The stream as XML: whoever has it needs no search."""
+        """The stream as XML: a reader that has it needs no search."""
         return self._samples.description
 
     def push(self, frame: Frame) -> None:

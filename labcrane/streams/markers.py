@@ -1,4 +1,4 @@
-"""Numbers for events: docs/markers.md describes both marker streams for whoever reads them.
+"""Numbers for events: docs/markers.md describes both marker streams for their readers.
 
 The other one carries an event as the journal holds it
 (:func:`labcrane.recording.journal.event_text`).

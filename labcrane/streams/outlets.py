@@ -130,12 +130,12 @@ class SampleOutlet:
 
     @property
     def description(self) -> str:
-        """The stream as XML: whoever has it needs no search."""
+        """The stream as XML: a reader that has it needs no search."""
         return "" if self._outlet is None else str(self._outlet.get_info().as_xml())
 
     @property
     def taken(self) -> bool:
-        """Whether somebody receives them."""
+        """Whether the stream has a receiver."""
         return self._outlet is not None and bool(self._outlet.have_consumers())
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Pictures of cameras as a stream of strings for whoever watches; the recorder leaves it.
+"""Pictures of cameras as a stream of strings for pages; it is not recorded.
 
 A sample of ``labcrane.pictures.<name>`` is a JSON object: ``camera``, its name; ``due``, when what
 it shows happened; ``legend``, what its greys mean; ``png``, the picture in base 64. Its time is
@@ -36,7 +36,7 @@ def pictures_source(source: str, name: str) -> str:
 
 
 class PictureOutlet:
-    """Sends pictures from a thread of its own: whoever shows them does not wait."""
+    """Sends pictures from a thread of its own: views do not wait for it."""
 
     def __init__(self, name: str, source: str) -> None:
         import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
@@ -55,7 +55,7 @@ class PictureOutlet:
 
     @property
     def wanted(self) -> bool:
-        """Whether somebody watches, and the pictures before are on their way."""
+        """Whether the stream has a receiver, and earlier pictures have been sent."""
         return self._free.is_set() and bool(self._outlet.have_consumers())
 
     def push(self, pictures: Mapping[str, CameraImage], stamp: float) -> None:

@@ -25,7 +25,7 @@ class Probe(NamedTuple):
     rtt
         Round trip; the offset is wrong by half of it at most.
     local
-        Our time when liblsl told of it.
+        Our time when liblsl reported it.
     """
 
     remote_time: float

@@ -49,8 +49,8 @@ class StreamRequest:
         Whether a protocol is written for any stream of the type, each laboratory's own: a run asks
         all the same which one it is.
     confirmed
-        The one stream of the type that somebody said is meant, :data:`NOBODY` where none is; None
-        as long as nobody was asked.
+        The confirmed stream of the type, :data:`NOBODY` if none is meant; None before the
+        question.
     """
 
     label: str
@@ -103,7 +103,7 @@ class StreamRequest:
 
     @property
     def asks(self) -> bool:
-        """Whether somebody must say first which stream of a type is meant."""
+        """Whether a stream of a type must be confirmed first."""
         return self.by_type_alone and not self.several and self.confirmed is None
 
     def taken(self, name: str, source_id: str, host: str) -> str | None:

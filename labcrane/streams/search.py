@@ -2,7 +2,7 @@
 
 liblsl asks the network in waves. Each wave takes one UDP port of its range for as long as answers
 may come, up to 5 s, and a search that goes on takes up to twenty of the thirty-two ports there are
-by default: two such programs, and no outlet opens any more. A search that is told how long to wait
+by default: two such programs, and no outlet opens any more. A search with a time limit
 also waits for the answers to a wave that it sends at its very end, 5 s longer. So a search here is
 a look of one wave at a time, its ports are given back, and nobody waits for liblsl.
 """
@@ -122,7 +122,7 @@ class Search:
 
 
 def find(predicate: str, wait_s: float, minimum: int = 1) -> "list[pylsl.StreamInfo]":
-    """Return the streams that meet a predicate, within the time that is told.
+    """Return the streams that meet a predicate, within the time limit.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Triggers: pulses by which other devices are told of a session's events, tick by tick."""
+"""Triggers: pulses that report a session's events to other devices, tick by tick."""
 
 import math
 import time
@@ -30,7 +30,7 @@ WAITING = 64
 """Codes that are waited for at most; a line without echoes is waited for in vain."""
 
 LOOKED_AT = LIMITS["trigger echo"].most
-"""Codes of a tick that are looked at; a device that sends more is broken, or somebody else's."""
+"""Codes of a tick that are looked at; a device that sends more is broken, or a different one."""
 
 STRAYS = 20
 """Codes a second that were never sent, and are written down all the same."""
@@ -99,7 +99,7 @@ class Triggers:
     note
         Writes an event into the record that was found out after a tick, of that number.
     tell
-        Tells the examiner of an event.
+        Reports an event to the experimenter.
     """
 
     def __init__(

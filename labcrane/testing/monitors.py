@@ -99,7 +99,7 @@ def _times(stream: SignalStream, samples: FloatArray) -> FloatArray:
 
 
 def _checked(stream: SignalStream, faults: object) -> set[tuple[str, str]]:
-    """Return which faults of which channels are told, and check that each says so properly."""
+    """Return the reported faults by channel, and check that each report is complete."""
     labels = {"", *(channel.label for channel in stream.channels)}
     found: set[tuple[str, str]] = set()
     assert isinstance(faults, list | tuple), f"look() must return a sequence, not {faults!r}"

@@ -138,7 +138,7 @@ def check_signals(component: Component) -> None:
 class InputContract:
     """What every input device must do. Provide the fixture ``device``.
 
-    Set ``goes_on`` for a device that does not begin anew with a trial: a log that is played.
+    Set ``goes_on`` for a device that does not restart with a trial: a log that is played.
     """
 
     goes_on = False

@@ -25,7 +25,7 @@ from labcrane.testing.roles import (
 class TaskContract:
     """What every task must do. Provide the fixture ``task``.
 
-    Name in ``needs`` what the task asks of the machine's state beside that of every crane; the
+    Name in ``needs`` what the task needs of the machine's state beyond that of every crane; the
     stand-in has zeros there.
     """
 

@@ -1,4 +1,4 @@
-"""Contract of triggers: lines by which other devices are told of events."""
+"""Contract of triggers: lines that report events to other devices."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""The performance indicator as it stands: what the supervisor sees of a test while it runs."""
+"""The present performance indicator, as the experimenter sees it while a test runs."""
 
 import math
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ WORDS = {
 
 
 class Assessment:
-    """Follows reference stages, tests, ratings and what the supervisor decides about them.
+    """Follows reference stages, tests, ratings and the experimenter's decisions about them.
 
     Only trials of a task that counts these mistakes are tests. Until the next begins, the one that
     has ended is shown, and orders about it count.

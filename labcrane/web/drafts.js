@@ -1,6 +1,6 @@
-// Drafts: what is half written in a field is kept in this tab, and put back when the page was loaded
-// anew. A field names its draft (`data-draft`) and says what the record holds of it (`data-held`): a
-// draft of what has been saved, or was changed elsewhere since, is forgotten.
+// Drafts: unsaved text of a field is kept in this tab, and restored when the page was reloaded.
+// A field names its draft (`data-draft`) and states the recorded value (`data-held`): a
+// draft of text that has been saved, or was changed elsewhere since, is discarded.
 (() => {
   const place = (field) => `labcrane-draft ${field.dataset.draft}`;
   const each = (node, then) => {

@@ -1,4 +1,4 @@
-"""The supervisor's page: a control room of what happens, and of what can be done about it."""
+"""The experimenter's page: a control room that shows the session and sends actions."""
 
 from typing import Any
 

@@ -266,7 +266,7 @@ class Form:
 
 
 def _label(item: Item, value: float) -> str:
-    """Return what stands at a step of a scale: its number and words, or nothing."""
+    """Return the label of a step of a scale: its number and words, or nothing."""
     said = item.worded.get(value, "")
     return f"{value:g}  {said}".strip() if item.numbered else said
 

@@ -33,7 +33,7 @@ class PageHandle:
     """Keeps the page process running for as long as the run lasts, and says the pages' links once.
 
     A page that hangs never makes the launcher wait. Events are kept, and the last status of the
-    streams: a page that is started again is told all of them, also after the recorder has ended.
+    streams: a page that is restarted receives all of them, also after the recorder has ended.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class PageHandle:
     say
         Tells the people at the terminal.
     streams
-        Says what the recorder says of the streams of others.
+        Returns the recorder's status of the external streams.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class PageHandle:
             self._process.tell(event)
 
     def close(self, ended: SessionLeft) -> None:
-        """Show the end until the supervisor has closed the page, and end the process.
+        """Show the end until the experimenter has closed the page, and end the process.
 
         Where no browser has it, nobody is waited for. An interrupt at the terminal closes it too.
         """
@@ -114,7 +114,7 @@ class PageHandle:
             self._process.stop()
 
     def _open(self) -> bool:
-        """Whether some browser has the supervisor's page, or had it a moment ago."""
+        """Whether a browser has the experimenter's page, or had it a moment ago."""
         if self._closed.is_set() or self._given_up:
             return False
         return self._browsers > 0 or time.monotonic() - self._left_at < GONE_S

@@ -28,7 +28,7 @@ BANDS = 120
 class Live:
     """Keeps the newest value of every signal, and some seconds of history for charts.
 
-    A thread pulls; whoever reads gets what there is. The stream is found again when a session is.
+    A thread pulls; readers get the latest data. The stream is found again when a session is.
 
     Attributes
     ----------

@@ -46,7 +46,7 @@ class PageContext:
     earlier
         What was measured before, to compare the newest movements with.
     close
-        Ends the pages, when the supervisor has seen the end.
+        Ends the pages, when the experimenter has seen the end.
     buckets
         How many orders each page may give now.
     participant
@@ -69,7 +69,7 @@ class PageContext:
     )
 
     def words(self, page: str) -> Words:
-        """Return the words of a page; the supervisor's is English."""
+        """Return the words of a page; the experimenter's is English."""
         return WORDS[self.study.protocol.page.language if page == PARTICIPANT else "en"]
 
     def give(self, page: str, order: Order, text: str = "", at: str | None = None) -> str:
@@ -101,7 +101,7 @@ def speak(language: str) -> None:
 
 
 def keep_drafts() -> None:
-    """Have what is half written on the page that is being built outlive that it is loaded anew."""
+    """Keep unsaved text of the page that is being built when it is reloaded."""
     from nicegui import ui  # noqa: PLC0415
 
     ui.add_head_html(f"<script>{DRAFTS.read_text(encoding='utf-8')}</script>")

@@ -1,4 +1,4 @@
-"""Panels of the supervisor's page: loads in words, and the views' cameras."""
+"""Panels of the experimenter's page: loads in words, and the views' cameras."""
 
 import math
 from functools import partial

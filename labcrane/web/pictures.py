@@ -10,7 +10,7 @@ from labcrane.streams.pictures import KEPT_S, pictures_source
 
 PAUSE_S = 0.05
 STALE_S = 3.0
-"""A picture that nobody has renewed for so long is not shown: it could be taken for what is now."""
+"""A picture older than this is not shown: it could be mistaken for the present one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class Pictures:
             thread.join()
 
     def of(self, view: str, camera: str) -> tuple[Shot | None, str]:
-        """Return the picture that may be shown now, if there is one, and what to say of it."""
+        """Return the picture that may be shown now, if there is one, and its caption."""
         import pylsl  # noqa: PLC0415
 
         shot = self._newest.get((view, camera))

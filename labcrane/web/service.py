@@ -38,12 +38,12 @@ the pages could not be reached for more than a minute."""
 
 MISSED = 10_000
 """How many changes of a page are kept for a browser that is away: more than come in ``AWAY_S``. One
-that has missed more is loaded anew too."""
+that has missed more is reloaded too."""
 
 
 @dataclass(frozen=True)
 class PageConfig:
-    """What the page process is told.
+    """Configuration of the page process.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Used:
 
 @dataclass(frozen=True, slots=True)
 class Streams:
-    """Said by the launcher: what the recorder says of the streams of others."""
+    """From the launcher: the recorder's status of the external streams."""
 
     status: dict[str, Any]
 
@@ -102,14 +102,14 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """Said to the launcher: the supervisor's page is open in some browser, or in none."""
+    """To the launcher: the experimenter's page is open in some browser, or in none."""
 
     browsers: int
 
 
 @dataclass(frozen=True, slots=True)
 class Closed:
-    """Said to the launcher: the supervisor has seen the end, and closed the page."""
+    """To the launcher: the experimenter has seen the end, and closed the page."""
 
 
 def main() -> int:

@@ -183,8 +183,8 @@ def test_a_session_begun_by_another_plan_is_not_gone_on_with(tmp_path: Path) -> 
     with pytest.raises(
         ProtocolError,
         match=r"begun with another plan: trial 1 was pair '2m_\w+', distance 2\.0, .* and the plan "
-        r"has pair '2\.5m_\w+', distance 2\.5, .*; go on with the protocol, and the place in the "
-        r"design, with which it was begun",
+        r"has pair '2\.5m_\w+', distance 2\.5, .*; continue with the protocol, and the place in "
+        r"the design, with which it was begun",
     ):
         record(replace(begun, study=study, resumed=True), ScriptedConsole())
     assert len(parts(begun.journal)) == 1, "nothing was begun"

@@ -1,4 +1,4 @@
-"""Candidates for streams that only their type asks for, until somebody says which one is meant.
+"""Candidates for streams that are requested by type only, until one of them is confirmed.
 
 A neighbour's amplifier is of the same type as one's own. So nothing of a candidate is recorded: its
 people were not asked, and who looks at the recording could not tell it from the right one.
@@ -37,7 +37,7 @@ class Candidate:
         return cls((source_id, name, kind), fields["host"])
 
     def is_called(self, word: str) -> bool:
-        """Whether somebody means it who says this; everybody does who says nothing."""
+        """Whether a word names it; an empty word names every candidate."""
         return word in ("", *self.identity[:2])
 
     def __str__(self) -> str:

@@ -107,11 +107,11 @@ class RecorderHandle:
 
     @property
     def asks(self) -> bool:
-        """Whether somebody is asked which stream of a type is meant."""
+        """Whether a stream of a type needs confirmation."""
         return any(stream["candidates"] for stream in self.status.get("streams", ()))
 
     def confirm(self, text: str) -> tuple[str, str]:
-        """Let the stream of a type be recorded that somebody says is meant.
+        """Record the confirmed stream of a type.
 
         ``text`` is read by :func:`labcrane.streams.recorder.candidates.answered`. Returns the
         study's name for it, and in words which it is.

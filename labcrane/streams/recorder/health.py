@@ -52,7 +52,7 @@ class Condition(StrEnum):
     """How a stream is."""
 
     ABSENT = "absent"
-    ASKED = "asked about"  # one fits by its type alone, and nobody has said that it is meant
+    ASKED = "asked about"  # one fits by its type only, and is not confirmed
     OPENING = "opening"
     EMPTY = "empty"  # found, but no sample came yet
     FLOWS = "flows"
@@ -126,7 +126,7 @@ def picture_rate(flow: "Flow", now: float) -> float | None:
 
 
 def rate_of(name: str, flow: "Flow", now: float) -> float | None:
-    """Return the rate of the stream ``name``: that of pictures where it tells of a view."""
+    """Return the rate of the stream ``name``: that of pictures if it is a view's log."""
     return (picture_rate if name.startswith(LOG) else rate)(flow, now)
 
 
@@ -182,11 +182,11 @@ class Counter:
         return None if counting is None else cls(header.labels.index(counting))
 
     def forget(self) -> None:
-        """Begin anew: the source is another process."""
+        """Reset: the source is another process."""
         self._last = None
 
     def missing(self, data: npt.NDArray[Any]) -> int:
-        """Return how many samples the counter left out; a wrap to a lower number is no gap."""
+        """Return how many samples the counter left out; a wrap to a lower number is not a gap."""
         counts = np.asarray(data[:, self._column], dtype=np.float64)
         if self._last is not None:
             counts = np.r_[self._last, counts]

@@ -107,7 +107,7 @@ class Inlet:
         return self.flow.fault is None and not self.alive
 
     def _watched(self, work: Callable[[], None]) -> None:
-        """Do a thread's work; should it fail, that is no secret."""
+        """Do a thread's work, and report it if it fails."""
         try:
             work()
         finally:

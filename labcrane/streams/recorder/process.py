@@ -1,12 +1,12 @@
-"""The process that records the streams of others, and outlives the session.
+"""The process that records the external streams, and outlives the session.
 
 It finds whatever it was asked for, late or again after a restart. Its own journal is closed some
-seconds after whoever started it has died, so that nothing of the end is lost.
+seconds after its parent has died, so that nothing of the end is lost.
 
 A launcher starts it by a :class:`labcrane.processes.handle.ProcessHandle`, before there is anything
-to record: it has loaded everything and waits for its :class:`RecorderConfig`. It is told ``stop``,
-descriptions of streams it need not search for, and which stream of a type is meant,
-and tells every second how each stream is, and whether all that is required flows. By hand, its
+to record: it has loaded everything and waits for its :class:`RecorderConfig`. It receives ``stop``,
+descriptions of streams it need not search for, and which stream of a type was confirmed,
+and reports every second how each stream is, and whether all that is required flows. By hand, its
 orders are JSON, ``stop`` is a line of its standard input, a status a line of its standard output:
 
     python -m labcrane.streams.recorder.process '{"journal": "ses-01_streams.xdf", "streams": []}'
@@ -45,7 +45,7 @@ STATUS_FD = 1
 
 
 class Chief(Protocol):
-    """Whoever tells a recorder when to stop, and is told how it is."""
+    """A connection that can stop a recorder, and receives its status."""
 
     gone: threading.Event
     """Set when it has died."""
@@ -71,7 +71,7 @@ class RecorderConfig:
     streams
         What to record.
     grace_s
-        How long it goes on when whoever started it has died.
+        How long it continues after its parent has died.
     part
         Which part it writes, counted from 1; None for the first that there is not yet.
     known
@@ -122,7 +122,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def run(orders: RecorderConfig, chief: Chief) -> int:
-    """Record until told to stop, or until whoever started it has died."""
+    """Record until told to stop, or until the parent has died."""
     check_clock()
     recorder = Recorder(orders.journal, orders.streams, orders.part, orders.known, orders.monitors)
     try:
@@ -172,7 +172,7 @@ def _signals() -> threading.Event:
 
 
 class _Terminal:
-    """Whoever started the recorder by hand: reads lines and writes lines, in threads.
+    """Terminal of a recorder that was started by hand: reads and writes lines, in threads.
 
     A reader that hangs or has died misses some lines, but gets whole ones.
     """

@@ -1,4 +1,4 @@
-"""Recorder of the streams of others: whatever was asked for, late or again after a restart."""
+"""Recorder of the external streams: all that were requested, late or again after a restart."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -47,7 +47,7 @@ class _Recorded:
 class Recorder:
     """Records what is asked for as soon as it is there. Call ``look`` several times a second.
 
-    What is asked for by its type alone waits until somebody has said which stream is meant.
+    A stream that is requested by type only waits until one candidate is confirmed.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class Recorder:
             self._feed.look()
 
     def know(self, descriptions: Sequence[str]) -> None:
-        """Start to record streams on this computer of which somebody tells, without a search."""
+        """Record streams on this computer from their descriptions, without a search."""
         for info in map(known_stream, descriptions):
             if info is not None:
                 self._latest[_key(info)] = info
@@ -161,7 +161,7 @@ class Recorder:
 
     def _absent(self, request: StreamRequest) -> Health:
         """Return how a stream is that is not recorded: asked about, left out or not there."""
-        # In one order, whichever answers first: who is told it again looks for what is new.
+        # In one order, whichever answers first: a reader compares it with the last one.
         if candidates := sorted(self._candidates.get(request.label, ())):
             kind, required = request.type or "", request.required
             said = question(request.label, kind, candidates, required=required)
@@ -278,7 +278,7 @@ def _key(info: "pylsl.StreamInfo") -> tuple[str, str, str]:
 def _health(recorded: _Recorded, now: float, rivals: list[str]) -> Health:
     inlet, flow, info = recorded.inlet, recorded.inlet.flow, recorded.inlet.info
     probe, signals = flow.probe, inlet.signals
-    # The time of the measurement on our clock, not the time when liblsl told of it.
+    # The time of the measurement on our clock, not the time when liblsl reported it.
     age = None if probe is None else now - (probe.remote_time + probe.offset)
     health = Health(
         label=recorded.request.label,

@@ -57,7 +57,7 @@ class SignalTap:
         self._number = feed.join(self)
 
     def begin(self, header: StreamHeader) -> None:
-        """Say which stream comes; text is nobody's signal, and our own streams are no device's."""
+        """Say which stream comes; text has no signal, and our own streams are not from a device."""
         if header.dtype is None or header.name.startswith(OURS):
             return
         channels = tuple(SignalChannel(one.label, one.unit, one.type) for one in header.channels)
@@ -83,7 +83,7 @@ class SignalTap:
         self.failed = answer["failed"]
 
     def forget(self) -> None:
-        """Take back what is told: the monitors begin anew."""
+        """Withdraw all faults: the monitors restart."""
         for change in self.faults.values():
             self._note(SIGNAL, **{**change, "bad": False})
         self.faults = {}

@@ -54,7 +54,7 @@ class Treatment:
     can_drop_samples
         Whether the source may leave out samples, as cameras do.
     dejitter
-        Whether stamps are made even; markers never are, nor streams that may drop samples.
+        Whether timestamps are dejittered; markers never are, nor streams that may drop samples.
     transport_s
         Least time from sampling to stamping, for sources stamped when sent. It cannot be observed.
     latency_s
@@ -232,7 +232,7 @@ def _correct(raw: RawStream, treatment: Treatment, end: float | None) -> Correct
 def _examined(raw: RawStream, placed: Placement, *, regular: bool) -> list[_Sampled]:
     """Return how each clock's samples were sampled, and their even times where these help."""
     arrival, times = raw.arrival(), placed.time
-    if placed.long_frozen:  # what stood still says nothing of how samples were taken
+    if placed.long_frozen:  # frozen timestamps do not show how samples were taken
         own = moving(raw.stamps)
         times = np.interp(np.arange(len(times)), own, times[own])
     found: list[_Sampled] = []
@@ -263,7 +263,7 @@ def _followed(time: FloatArray, sampling: Sampling) -> _Followed:
     if sampling.received is None or not sampling.received.polled:
         evened, doubt = time.copy(), np.full(len(time), sampling.noise_s)
         for start, stop in itertools.pairwise((0, *sampling.breaks, len(time))):
-            if stop - start >= LONG_RUN:  # how long a hole is, is not made even
+            if stop - start >= LONG_RUN:  # the length of a hole is not dejittered
                 part = slice(start, stop)
                 evened[part], doubt[part] = follow_sample_clock(time[part], sampling.index[part])
         return evened, doubt
@@ -274,7 +274,7 @@ def _followed(time: FloatArray, sampling: Sampling) -> _Followed:
 def _evened(
     raw: RawStream, placed: Placement, sampled: list[_Sampled], treatment: Treatment
 ) -> tuple[FloatArray, FloatArray]:
-    """Return times made even where that helps or is asked for, and errors with what remains."""
+    """Return times, dejittered where that helps or is requested, with the remaining errors."""
     time, error = placed.time.copy(), placed.error.copy()
     way = treatment.way
     declared = treatment.transport_s != 0.0 or treatment.latency_s != 0.0

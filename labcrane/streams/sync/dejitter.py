@@ -37,7 +37,7 @@ Line = Callable[[FloatArray], FloatArray]
 
 
 class Dejitter(StrEnum):
-    """How uneven stamps are made even."""
+    """How uneven timestamps are dejittered."""
 
     AUTO = "auto"  # only where it is shown to help
     NONE = "none"
@@ -46,7 +46,7 @@ class Dejitter(StrEnum):
 
 
 def even(times: FloatArray, index: FloatArray, way: Dejitter) -> FloatArray:
-    """Return evened times, shape ``(n,)``.
+    """Return dejittered times, shape ``(n,)``.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def runs(times: FloatArray, index: FloatArray) -> list[tuple[int, int]]:
     steps, counts = np.diff(times), np.diff(index)
     period = float(np.median(steps / np.maximum(counts, 1.0)))
     odd = np.abs(steps - period * counts)
-    # Eight times what nearly all steps stay below: chunks that travel unevenly are no gaps.
+    # Eight times what nearly all steps stay below: chunks that travel unevenly are not gaps.
     limit = min(max(1.5 * period, 8.0 * float(np.quantile(odd, 0.995))), 1.0)
     rest = times - period * index
     near = max(round(PASSING_S / period), 1)

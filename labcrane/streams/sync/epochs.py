@@ -112,7 +112,7 @@ def _change(probes: FloatArray, k: int, what: int) -> float:
 
 
 def in_order(probes: FloatArray) -> FloatArray:
-    """Return the probes as they were told, each once."""
+    """Return the probes in the order of their reports, each once."""
     if not len(probes):
         return probes
     ordered = probes[np.argsort(probes[:, LOCAL], kind="stable")]
@@ -181,11 +181,11 @@ def _without_strays(probes: FloatArray, jumps: list[int]) -> tuple[FloatArray, l
 def _changes(
     raw: RawStream, probes: FloatArray, jumps: list[int], *, regular: bool
 ) -> list[_Change]:
-    """Return every change of clock, that liblsl told of or that the probes show."""
+    """Return every change of clock, that liblsl reported or that the probes show."""
     changes = []
     left = set(jumps)
     for told, low, high in raw.resets:
-        # A probe under way at the restart may be told just after it, still of the old clock.
+        # A probe under way at the restart may be reported just after it, still of the old clock.
         near = [k for k in left if probes[k - 1, LOCAL] - 1.0 <= told <= probes[k, LOCAL]]
         probe = near[0] if near else int(np.searchsorted(probes[:, LOCAL], told))
         left -= set(near)

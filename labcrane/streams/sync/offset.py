@@ -24,7 +24,7 @@ LONG = 5
 
 COARSE_S = (1.0 / 64.0, 0.01, 1e-3, 1e-4)
 ENOUGH, NEARLY = 8, 1e-3
-"""So many round trips of whole units of a clock, and so nearly whole, are no chance."""
+"""So many round trips of whole units of a clock, and so nearly whole, do not occur by chance."""
 
 CLEARLY = 7.0
 """Log of the odds, a thousand to one, from which on the sampler is taken to be the steadier."""

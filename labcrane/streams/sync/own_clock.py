@@ -30,7 +30,7 @@ class OwnClock:
 
     @classmethod
     def of(cls, raw: RawStream) -> "OwnClock | None":
-        """Return what was logged with a stream; None where that is no use.
+        """Return what was logged with a stream; None where it cannot be used.
 
         No use: nothing was logged, our clock was not turned, or the stream's stamps are of it too.
         """

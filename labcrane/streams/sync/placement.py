@@ -46,7 +46,7 @@ LAG_BLUR_S = 0.00005
 """So near each other are the two bounds of a lag, at most, that arrivals are to show."""
 
 ONE_IN = 1000
-"""Of so many pulls, one may tell of the lag what chance did."""
+"""One of so many pulls may show a lag by chance."""
 
 SOON = 0.02
 FOREIGN_S = 1.0
@@ -70,7 +70,7 @@ ARRIVAL_SCATTERS_S = (0.0005, 0.002, 0.01, 0.05)
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """Times on our clock before anything is evened.
+    """Times on our clock before dejittering.
 
     Attributes
     ----------

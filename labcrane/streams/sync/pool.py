@@ -1,4 +1,4 @@
-"""Pool of clock probes: streams of one computer share its clock, and each tells of it."""
+"""Pool of clock probes: streams of one computer share its clock, and each one measures it."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -94,7 +94,7 @@ class Quality:
     moved_p95_s, moved_max_s
         By how much evening moved samples.
     steps, restarts, sleeps, slews
-        How often its clock jumped, its program began anew, its computer slept, its clock was turned
+        How often its clock jumped, its program restarted, its computer slept, its clock was turned
         faster or slower.
     own_slews
         How often our own clock was turned so, by the recorder's log of it.
@@ -188,7 +188,7 @@ def probe_age(stamps: FloatArray, segments: Sequence[ClockSegment], known: Float
 
 
 def clock_changes(segments: Sequence[ClockSegment], time: FloatArray) -> tuple[int, int, int]:
-    """Return how often the clock stepped, its program began anew, its computer slept.
+    """Return how often the clock stepped, its program restarted, its computer slept.
 
     While a computer sleeps its clock stands still: it falls behind by as long as nothing comes, be
     it samples or answers to probes.

@@ -36,7 +36,7 @@ class RawStream:
         Time stamps on the source's clock, shape ``(n,)``, in the order of arrival.
     probes
         Clock probes, shape ``(n_probes, 4)``: the source's time at the probe, what must be added to
-        its clock to have ours, the probe's round trip, and our time when liblsl told of it.
+        its clock to have ours, the probe's round trip, and our time when liblsl reported it.
     arrivals
         Shape ``(n_chunks, 2)``: samples received so far, our time at that moment.
     resets

@@ -101,5 +101,5 @@ def put_back(
 
 
 def place_of(of: Which) -> Which:
-    """Return, for each sample, its place among those that are no repeats, shape ``(n,)``."""
+    """Return, for each sample, its place among those that are not repeats, shape ``(n,)``."""
     return np.asarray((np.cumsum(of == np.arange(len(of))) - 1)[of], dtype=np.intp)

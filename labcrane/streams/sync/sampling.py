@@ -102,7 +102,7 @@ class Sampling:
     breaks
         The samples behind holes of which nothing shows how many periods they are.
     kept_s
-        By how much stamps scatter, as arrivals show, that could not be evened.
+        Scatter of timestamps, as arrivals show, that could not be dejittered.
     back_s
         By how much stamps go back, in sum, further than any buffer shrinks; of irregular streams
         without arrivals, by how much their clock may have been set back.
@@ -508,7 +508,7 @@ def _boundaries(found: _Steps) -> int:
 def coarse_unit(stamps: FloatArray, *, regular: bool) -> float:
     """Return the unit of a coarse clock of which stamps are whole ones apart; 0 if there is none.
 
-    Or the ticks that are told in it, if these are longer.
+    Or the ticks that are expressed in it, if these are longer.
     """
     unit = units.find(stamps)
     if not unit:

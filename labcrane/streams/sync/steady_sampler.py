@@ -1,4 +1,4 @@
-"""Steady sampler: what a regular stream's own stamps tell of how their clock was turned.
+"""Steady sampler: how a regular stream's own timestamps show that their clock was turned.
 
 A sampler with a crystal of its own goes on as before while a daemon turns the clock of its
 computer: every stamp then shows the turn, however long the probes were held up meanwhile.

@@ -17,7 +17,7 @@ RIGHTS: Mapping[str, frozenset[Order]] = {
     SUPERVISOR: frozenset(Order) - {Order.DENIED},
     PARTICIPANT: frozenset({Order.ANSWER, Order.SUBMIT, Order.CONSENT, Order.REPORT}),
 }
-"""What each page may ask of the session."""
+"""The actions that each page may send to the session."""
 
 SEE_OTHER, FORBIDDEN = 303, 403
 

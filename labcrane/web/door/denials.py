@@ -58,7 +58,7 @@ class Denials:
         self._tell(why)
 
     def flush(self) -> None:
-        """Tell how many were counted since the last one that was told."""
+        """Report how many were counted since the last report."""
         with self._lock:
             more, last, self._more = self._more, self._last, 0
         if more:

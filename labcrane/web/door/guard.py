@@ -23,8 +23,8 @@ MOST_BODY = LIMITS["request body"].most
 MOST_REQUESTS_S = LIMITS["requests of one address"].most
 MOST_LOADS_S = LIMITS["page loads of one address"].most
 LOADS_AT_ONCE = 30
-"""A page is put together for whoever loads it, which takes 30 ms: fifty a second would leave no
-time for anybody else's orders."""
+"""A page is built for each load, which takes 30 ms: fifty per second would leave no
+time for the actions of others."""
 
 MOST_REST_S = 0.1
 """Rest after a page at most: one that waited for something has not taken this process's time."""
@@ -109,8 +109,8 @@ class Guard:
     async def _in_turn(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
         """Put a page together when it is its turn, and rest as long as that took.
 
-        Whoever loads pages, from however many addresses, so takes half of this process's time at
-        most, and an order waits for one page, not for all that were asked for at once.
+        So page loads, from however many addresses, take half of this process's time at most,
+        and an action waits for one page, not for all that were requested at once.
         """
         await self._turn.acquire()
         clock = asyncio.get_running_loop()

@@ -17,7 +17,7 @@ MOST_HEAD = 16_384
 
 AWAY_S = 30.0
 """How long a browser may be without connection, as a tablet or a laptop that sleeps, and find its
-page as it was. After that the page is loaded anew; what was half written is in the browser."""
+page unchanged. After that the page is reloaded; unsaved text is in the browser."""
 
 MOST_MISSED = 1000
 
@@ -65,6 +65,6 @@ def build_pages(app: Any, missed: int = MOST_MISSED) -> None:
     from nicegui import app as own  # noqa: PLC0415 - loads for a second
     from nicegui import ui  # noqa: PLC0415
 
-    # The bar that tells of each request has no name, and screen readers would tell of it.
+    # The progress bar of requests has no name, and screen readers would announce it.
     own.config.quasar_config["loadingBar"]["skipHijack"] = True
     ui.run_with(app, title="labcrane", show_welcome_message=False, message_history_length=missed)

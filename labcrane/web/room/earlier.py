@@ -14,7 +14,7 @@ from labcrane.participants.register import struck
 from labcrane.recording.data_folder import DataFolder
 
 FEWEST = 3
-"""People of whom a cohort is shown: of fewer the shaded band would be somebody."""
+"""Minimum size of a cohort that is shown: with fewer, the band would reveal a person."""
 
 MOST = 200
 """People of whom a cohort is made at most."""
@@ -63,7 +63,7 @@ def _read(found: Earlier, folder: Path, study: str, session: int, wanted: tuple[
     stamps = folder.name.removeprefix(DataFolder.pseudonym(folder.name))
     try:
         left_out = struck(Places(folder.parent))
-    except LabcraneError:  # whom it excludes nobody knows, so nobody is compared
+    except LabcraneError:  # exclusions are unknown, so no cohort is shown
         return
     others = [
         file

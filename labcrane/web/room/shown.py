@@ -24,7 +24,7 @@ LOOP = "loop"
 
 
 class DrawnCue(Protocol):
-    """What a cue is built of: a study's choice, or what a recording says of one."""
+    """What a cue is built from: a study's choice, or a recording's metadata."""
 
     @property
     def settings(self) -> Settings:

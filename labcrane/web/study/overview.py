@@ -64,7 +64,7 @@ class Sat:
 
 @dataclass(frozen=True, slots=True)
 class Due:
-    """What somebody's next session is.
+    """A participant's next session.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Person:
     name
         Pseudonym with its stamps.
     consent, consent_level
-        In words; ``"bad"`` where somebody was recorded without the approved text.
+        In words; ``"bad"`` if the participant was recorded without the approved text.
     due
         The next session; None when there is none.
     bytes
@@ -228,7 +228,7 @@ class Reader:
         )
 
     def _text(self, recorded: Sequence[Participant]) -> dict[str, Any]:
-        """Return the protocol as it is written; nothing where nobody can say."""
+        """Return the protocol as it is written; empty if it is unknown."""
         if self.protocol is not None:
             content = parse_yaml(self.protocol.read_text(encoding="utf-8"), str(self.protocol))
             return dict(content) if isinstance(content, dict) else {}
@@ -355,7 +355,7 @@ def _quality(
 def _due(
     planned: Sequence[PlannedSession], person: Person, entry: Entry | None, today: date
 ) -> Due | None:
-    """Return somebody's next session; None for who has had all, was excluded or is no real one."""
+    """Return a person's next session; None if all are done, or if excluded or simulated."""
     if DataFolder.pseudonym(person.name) != person.name or person.status in {
         Status.EXCLUDED, Status.SIMULATED, Status.PILOT
     }:  # fmt: skip

@@ -28,7 +28,7 @@ PATIENCE_S = 60.0
 def serve(
     reader: Reader, registry: Callable[[], Registry], port: int, say: Callable[[str], None]
 ) -> None:
-    """Serve the study's page to this computer until it is interrupted; ``say`` is told its link.
+    """Serve the study's page to this computer until it is interrupted; ``say`` receives its link.
 
     ``registry`` gives what draws recorded cues, when the first recording is looked at.
     """

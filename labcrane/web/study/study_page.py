@@ -24,7 +24,7 @@ def page_of(overview: Overview, today: date, made: str) -> str:
     Parameters
     ----------
     made
-        When it was made, for whoever reads it.
+        When it was made, as readers see it.
     """
     folder = overview.folder.absolute()
     reports = overview.report / "participants" if overview.report is not None else None
@@ -55,7 +55,7 @@ def page_of(overview: Overview, today: date, made: str) -> str:
 
 
 def _figures(overview: Overview) -> Iterator[tuple[str, str, str, str]]:
-    """Yield what is told in a number: its name, the number, what belongs to it, and its level."""
+    """Yield the figures: name, number, additional text and level."""
     real = [one for one in overview.people if one.status not in {"simulated", "pilot"}]
     complete = sum(one.status == "complete" for one in real)
     sessions = sum(len(one.sat) for one in real)
@@ -82,7 +82,7 @@ def size(count: int) -> str:
 
 
 def _left(due: Due, today: date) -> str:
-    """Return how many days somebody still has; nothing without a window."""
+    """Return how many days are left; nothing without a window."""
     if due.last is None:
         return ""
     if due.first is not None and today < due.first:

@@ -58,7 +58,7 @@ class Timeline(Element, component="viewer.js"):
             # Beside everything else: an hour of a signal is read, and a jump waits for nobody.
             try:
                 found = await asyncio.to_thread(self._answers[kind], asked)
-            except BaseException:  # whoever asks again is not left without an answer
+            except BaseException:  # a repeated request is answered again
                 self._given.pop(ident, None)
                 raise
             self._given[ident] = {**found, "failed": why} if why else found

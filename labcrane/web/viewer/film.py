@@ -91,7 +91,7 @@ class Film:
     Attributes
     ----------
     run
-        What was run, as far as drawing it goes; nobody can steer it.
+        What was run, as far as drawing it needs; it cannot be steered.
     shift
         How many seconds later than another film beside it this one is shown.
     """
@@ -272,12 +272,12 @@ class Film:
 
     @cached_property
     def glances(self) -> Glances:
-        """Where somebody looked, if that was recorded."""
+        """Where the operator looked, if that was recorded."""
         return Glances(self._record, self.start)
 
     @cached_property
     def unmeasured(self) -> list[tuple[str, str]]:
-        """Gaze streams of which it is not shown where somebody looked, and why."""
+        """Gaze streams that are not shown, and why."""
         return unmeasured(self._record)
 
     @cached_property

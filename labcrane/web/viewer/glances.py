@@ -1,4 +1,4 @@
-"""Glances: where somebody looked, and at which area of the picture, at any time of a film.
+"""Glances: where the operator looked, and at which area of the picture, at any time of a film.
 
 A gaze stream (type ``Gaze``) says it by a channel ``aoi``, or by a place in the window; a view's
 stream of areas (``labcrane.feedback.NAME.areas``) says where things were in its picture. A picture
@@ -25,7 +25,7 @@ TRAIL_S = 0.5
 """How much of the way of the gaze is shown."""
 
 STALE_S = 0.5
-"""What is older is not where somebody looks now: a blink, or a gap."""
+"""Older gaze is not the present one: a blink, or a gap."""
 
 LANE = 300
 """Steps of the lane beneath the time line."""

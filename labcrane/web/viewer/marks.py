@@ -9,7 +9,7 @@ from labcrane.web.viewer.film import Film
 
 
 class Marks:
-    """The marks of one film, in seconds from its start, and what a page asks of them.
+    """The marks of one film, in seconds from its start, and what a page requests.
 
     What is asked and cannot be done is said on the page; nothing that was recorded is touched.
     """
@@ -19,7 +19,7 @@ class Marks:
         self._start = film.start
 
     def shown(self, said: str = "") -> dict[str, Any]:
-        """Return every mark that holds and what is to be said of them, ready for JSON."""
+        """Return every valid mark and the message about them, ready for JSON."""
         if self._place is None:
             return {"marks": [], "markSaid": "", "marking": False}
         file, session = self._place

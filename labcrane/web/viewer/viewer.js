@@ -1,4 +1,4 @@
-// Viewer of a recorded session: a time line, curves and events about a time that the server is told.
+// Viewer of a recorded session: a timeline, curves and events around a time that the page requests.
 // Whatever is asked is asked again until it is answered: a message is lost with its connection.
 
 const STEP_MS = 60, AGAIN_MS = 2000, SOON_MS = 150;

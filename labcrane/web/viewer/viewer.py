@@ -176,7 +176,7 @@ def _answers(film: Film, marks: Marks, glances: Glances) -> dict[str, Answer]:
 def serve(
     films: Sequence[Film], registry: Registry, port: int, at: float, say: Callable[[str], None]
 ) -> None:
-    """Serve the viewer to this computer until it is interrupted; ``say`` is told its link."""
+    """Serve the viewer to this computer until it is interrupted; ``say`` receives its link."""
     from fastapi import FastAPI  # noqa: PLC0415
     from nicegui import ui  # noqa: PLC0415
 

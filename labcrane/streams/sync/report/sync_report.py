@@ -53,13 +53,13 @@ class SyncReport:
     streams, loop
         What was recorded; no loop where its clock was moved by hand.
     missing
-        What is to be said of streams that never came.
+        Findings on streams that never came.
     absent
         Streams that are not there in a rehearsal, by label: nothing of them can have failed.
     presented
-        What is to be said of movements of which the operator was shown too little.
+        Findings on movements of which the operator was shown too little.
     interrupted
-        What is to be said of movements that were paused since a view or sound had failed.
+        Findings on movements that were paused after a view or sound had failed.
     """
 
     streams: tuple[StreamReport, ...]
@@ -142,7 +142,7 @@ def judge_loop(
 
 
 def never_came(labels: Mapping[str, bool]) -> tuple[Finding, ...]:
-    """Return what to say of streams never seen: by label, whether each is required."""
+    """Return findings on streams that never came: by label, whether each is required."""
     return tuple(
         Finding(
             Verdict.FAIL if required else Verdict.WARN,

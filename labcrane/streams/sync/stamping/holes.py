@@ -29,11 +29,11 @@ LEVEL = 20
 """So many stamps before and after a hole tell how long it is."""
 
 PASSING_S = 5.0
-"""Delays pass within this, or within twice as many samples as are owed."""
+"""Delays pass within this, or within twice as many samples as are missing."""
 
 MADE_GOOD, REST = 0.3, 0.1
-"""A burst makes good more than the first part of a step, or it is none; the period is known too
-little to say of less than the second that it is missing."""
+"""A burst makes good more than the first part of a step, or it is not a burst; the period is not
+known well enough to show that less than the second is missing."""
 
 BROKEN = 0.01
 """What is lost shifts stamps by whole periods, and no further from them than this."""
@@ -58,7 +58,7 @@ class Holes:
     periods
         By how many periods each is longer than the usual step; 0 where a burst made it good.
     broken
-        Which are no whole number of periods for sure: there nothing was lost, or not only.
+        Which are surely not a whole number of periods: loss is not their only cause.
     untold
         Which may be, or not: stamps scatter by too much to tell.
     usual

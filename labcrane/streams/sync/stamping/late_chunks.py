@@ -1,4 +1,4 @@
-"""Late chunks: what the soonest of them tell of a sampler whose chunks are stamped when sent.
+"""Late chunks: what the soonest of them show about a sampler that stamps chunks when sent.
 
 They wait for as long as their program and its computer let them. Delays pass; what was lost does
 not come back.

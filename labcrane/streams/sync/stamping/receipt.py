@@ -21,7 +21,7 @@ STEADY, STEADY_POLLED = 0.4, 0.75
 
 LITTLE_S = 5e-5
 LITTLE = 0.005
-"""What scatters by less than both, the second in periods, is told as it is."""
+"""What scatters by less than both, the second in periods, is reported unchanged."""
 
 SKEWED = 1.6
 """Delays reach so much further up from their median than down; errors of either sign do not."""

@@ -10,7 +10,7 @@ from labcrane.types import FloatArray
 
 DECIMAL_S = (1.0, 0.1)
 LEAST_S, MOST_S = 5e-5, 0.04
-"""Finer units are told as they are; no timer ticks in coarser ones."""
+"""Finer units are reported unchanged; no timer ticks in coarser ones."""
 
 TOLD_S = 1e-6
 """Many programs tell their stamps in this."""
@@ -19,7 +19,7 @@ MANY = 2000
 """So many different steps show what all of them are multiples of."""
 
 SEVERAL = 4.0
-"""A tick is longer than the unit that it is told in, by so much at least."""
+"""A tick is longer than the unit that it is expressed in, by so much at least."""
 
 NEARLY = 0.01
 """A tick so near to a part of the period is the sampler's."""
@@ -48,7 +48,7 @@ def find(stamps: FloatArray) -> float:
 
 
 def tick(stamps: FloatArray, unit: float, period: float) -> float:
-    """Return the ticks that are told in a coarse unit; the unit where it is the tick.
+    """Return the ticks that are expressed in a coarse unit; the unit where it is the tick.
 
     Parameters
     ----------
