@@ -6,12 +6,12 @@ import tty
 
 
 class LampDevice:
-    """Answers as the lamp does, and keeps what it was told.
+    """Answer as the lamp does, and keep the values that it received.
 
     Attributes
     ----------
     port
-        What to open as a serial port.
+        Path to open as a serial port.
     """
 
     def __init__(self, name: str = "lamp 1.2") -> None:

@@ -1,8 +1,8 @@
 """A lamp that brightens, and a motor that shakes the seat, as the tip comes closer.
 
-The device speaks lines of ASCII at 115200 baud. It answers ``?`` with its name, and takes
-``L 0`` to ``L 255`` (light) and ``M 0`` to ``M 255`` (motor). It goes dark when nothing comes for
-half a second, so that a dead program leaves no motor running.
+The device exchanges lines of ASCII at 115200 baud. It answers ``?`` with its name, and accepts
+``L 0`` to ``L 255`` (light) and ``M 0`` to ``M 255`` (motor). It switches off when it receives
+nothing for half a second, so that the motor stops if the program crashes.
 """
 
 import math
@@ -39,17 +39,17 @@ class LampSettings(Settings):
     """Serial port: ``/dev/ttyUSB0``, or ``COM3``."""
 
     far: PositiveFloat = 4.0
-    """Distance of tip and target, in metres, from which on it is dark."""
+    """Distance between tip and target, in metres, beyond which the lamp is dark."""
 
     shake_below: float = Field(default=0.5, ge=0.0)
-    """Distance in metres below which the motor runs, the faster the closer."""
+    """Distance in metres below which the motor runs; it runs faster as the tip gets closer."""
 
     def reveals(self) -> tuple[Within, ...]:
         return (Within("how far the tip is from the target", max(self.far, self.shake_below)),)
 
 
 class Lamp(Feedback):
-    """Light and motor as functions of the distance alone."""
+    """Set light and motor from the distance alone."""
 
     signals = (Signal("light", "1"), Signal("motor", "1"))
 
@@ -69,13 +69,13 @@ class Lamp(Feedback):
             self._name = self._line.readline().decode("ascii", "replace").strip()
         except serial.SerialException as error:
             raise DeviceError(
-                f"no lamp on {self._settings.port}: {error}; check the cable, and port: in the "
-                "protocol"
+                f"no lamp on {self._settings.port}: {error}; check the cable and the key port: in "
+                "the protocol"
             ) from error
         if not self._name.startswith("lamp"):
             raise DeviceError(
-                f"what is on {self._settings.port} answered {self._name!r}, and is no lamp; check "
-                "port: in the protocol"
+                f"the device on {self._settings.port} is not a lamp: it answered {self._name!r}; "
+                "check port: in the protocol"
             )
 
     def metadata(self) -> Mapping[str, Value]:

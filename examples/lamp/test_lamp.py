@@ -49,7 +49,7 @@ def test_the_distance_is_told_as_far_as_light_or_motor_follows_it() -> None:
 def test_something_else_on_the_port_is_refused() -> None:
     modem = LampDevice(name="AT")
     lamp = Lamp(LampSettings(port=modem.port))
-    with pytest.raises(DeviceError, match="answered 'AT', and is no lamp; check port:"):
+    with pytest.raises(DeviceError, match="is not a lamp: it answered 'AT'; check port:"):
         lamp.open(make_run(ch8(), task=TARGETS))
     lamp.close()
 

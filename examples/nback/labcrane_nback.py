@@ -1,9 +1,9 @@
-"""A spatial n-back task beside the movements: a ball appears now here, now there.
+"""A spatial n-back task during the movements: balls appear at changing places.
 
-The operator presses a button when it is where it was ``back`` balls ago. The cue ``nback_ball``
-draws the ball in every view; the feedback ``nback`` sends LSL markers, and records each ball and
-each press. Where the balls are depends on settings, trial and time alone, so that both agree
-without talking to each other.
+The operator presses a button when the place is the same as ``back`` balls ago. The cue
+``nback_ball`` draws the ball in every view. The feedback ``nback`` sends LSL markers and records
+each ball and each press. The places depend only on settings, trial and time, so that cue and
+feedback agree without communicating.
 """
 
 import json
@@ -34,31 +34,31 @@ PLACES = tuple((6.0, y, z) for z in (2.5, 3.5, 4.5) for y in (-1.5, 0.0, 1.5) if
 """Centres of the eight places, in metres in the machine's base frame: a ring ahead of the crane."""
 
 LONGEST = 1000
-"""Balls of a trial that are planned; it is over before."""
+"""Number of balls that are planned for a trial: more than any trial shows."""
 
 PRESSED = 0.5
 
 
 class NbackSettings(Settings):
-    """What is shown; the same for ``nback`` and ``nback_ball``."""
+    """Settings of the task; give ``nback`` and ``nback_ball`` the same."""
 
     back: int = Field(default=2, ge=1, le=4)
-    """How many balls ago the place is compared with."""
+    """Number of balls back with which the place is compared."""
 
     period_s: PositiveFloat = 2.5
-    """From one ball to the next, in seconds."""
+    """Time from one ball to the next, in seconds."""
 
     shown_s: PositiveFloat = 0.5
-    """How long a ball is seen, in seconds."""
+    """How long a ball is visible, in seconds."""
 
     match_share: float = Field(default=1 / 3, gt=0.0, lt=1.0)
-    """Share of the balls that are where they were."""
+    """Proportion of balls whose place matches."""
 
     button: ButtonName = "right.trigger"
     """The input's button with which the operator answers."""
 
     seed: int = 1
-    """Another seed is another order of places."""
+    """Seed of the order of places."""
 
     def needs(self, machine: Machine) -> Names:
         return {"button": [self.button]}
@@ -73,7 +73,7 @@ class Order:
 
 
 def order(settings: NbackSettings, trial: int) -> Order:
-    """Return where the balls of a trial are; nothing but the settings and the trial decides."""
+    """Return the places of a trial's balls, which depend only on the settings and the trial."""
     random = np.random.default_rng([settings.seed, trial])
     places: list[int] = []
     for number in range(LONGEST):
@@ -86,7 +86,7 @@ def order(settings: NbackSettings, trial: int) -> Order:
 
 
 class Course:
-    """Says which ball is shown in a frame."""
+    """Find the ball that is shown in a frame."""
 
     def __init__(self, settings: NbackSettings) -> None:
         self._settings = settings
@@ -94,7 +94,7 @@ class Course:
         self._order = Order((), ())
 
     def ball(self, frame: Frame) -> tuple[int, int, bool, bool] | None:
-        """Return number, place, match and whether it is seen now; None between trials."""
+        """Return the ball's number, place, match and visibility; None between trials."""
         if not frame.trial or (frame.task.size and np.isnan(frame.task).all()):
             return None  # between trials a task shows nothing
         if frame.trial != self._trial:
@@ -125,7 +125,7 @@ class NbackBall(Cue):
 
 
 class Nback(Feedback):
-    """Markers on LSL, and what the operator answers."""
+    """Send LSL markers and record the operator's answers."""
 
     signals = (Signal("ball", "1"), Signal("match", "1"), Signal("pressed", "1"))
 
@@ -161,7 +161,7 @@ class Nback(Feedback):
         self._outlet = None
 
     def _mark(self, frame: Frame, event: str, **data: object) -> None:
-        # Stamped when it was due in the simulation, like labcrane's own markers.
+        # The timestamp is the tick's due time in the simulation, as for labcrane's own markers.
         self._outlet.push_sample([json.dumps({"event": event, **data})], frame.tick.due)
 
 

@@ -1,4 +1,4 @@
-"""All recordings in one SQLite database, for whoever thinks in SQL."""
+"""Export all recordings to one SQLite database."""
 
 import json
 import sqlite3
@@ -16,14 +16,14 @@ class SqliteSettings(Settings):
     """Settings of the database: ``labcrane export DATA --to sqlite --set name=study.db``."""
 
     name: str = "study.db"
-    """The file's name."""
+    """Name of the database file."""
 
     ticks: bool = False
-    """Whether every tick's state is a row too; that makes it large."""
+    """Whether to add a row with the state at every tick; the database gets large."""
 
 
 class Sqlite(Exporter):
-    """Tables ``participant``, ``trial``, ``event``, and ``state`` if it is wanted."""
+    """Write the tables ``participant``, ``trial``, ``event`` and, on request, ``state``."""
 
     def __init__(self, settings: SqliteSettings) -> None:
         self._settings = settings
@@ -62,7 +62,7 @@ class Sqlite(Exporter):
 
 
 def _append(database: sqlite3.Connection, name: str, table) -> None:
-    """Append a pandas table, adding the columns that were not there before: tasks differ."""
+    """Append a pandas table and add new columns, because tasks have different columns."""
     rows = database.execute(f'select name from pragma_table_info("{name}")')
     if known := {column for (column,) in rows}:
         for column in table.columns:

@@ -65,7 +65,7 @@ def test_both_protocols_say_in_their_head_what_is_the_papers_and_what_is_ours() 
     for name in ("crane_pilot", "aiming"):
         text = (FOLDER.parent / name / "protocol.yaml").read_text()
         head = text.partition("\nlabcrane:")[0]
-        assert "# The paper's:" in head
+        assert "# From the paper:" in head
         assert "# Ours" in head
 
 

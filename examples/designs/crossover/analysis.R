@@ -1,25 +1,26 @@
-# The report's tests of movement time and of NASA-TLX once more, with afex:
+# Repeats the report's tests of movement time and NASA-TLX with afex:
 #
 #   labcrane export data --to tables --set streams=none --out tables
 #   Rscript analysis.R tables
 #
-# It prints them, and writes them into analysis.csv. The report's are tables/anova.csv and
-# tables/score_tests.csv; those "with pairs' means taken away" are not repeated here.
+# It prints the results and writes them to analysis.csv. The report's own results are in
+# tables/anova.csv and tables/score_tests.csv. The tests "with pairs' means taken away" are not
+# repeated here.
 
 suppressPackageStartupMessages(library(afex))
 
 folder <- c(commandArgs(TRUE), "tables")[1]
 trials <- read.csv(file.path(folder, "trials.csv"), na.strings = "")
 results <- subset(trials, practice == 0 & outcome == "success" & !is.na(movement_time))
-if ("presentation_failed" %in% names(results)) {  # pictures stood still: no result either
+if ("presentation_failed" %in% names(results)) {  # the picture froze: not a valid result
   results <- subset(results, is.na(presentation_failed) | presentation_failed == 0)
 }
 
-# Positions of pairs of targets count from 1 in each block.
+# Number the pairs of targets from 1 in each block.
 rank <- function(x) match(x, sort(unique(x)))
 results$sequence <- ave(results$sequence, results$participant, results$block, FUN = rank)
 
-# Every effect of a design that is of all factors in `of`.
+# Test the design and return the effects that involve all factors in `of`.
 test <- function(data, measure, within, of = within) {
   fit <- aov_ez("participant", measure, data, within = within, fun_aggregate = mean)
   plain <- anova(fit, correction = "none")
@@ -32,7 +33,7 @@ test <- function(data, measure, within, of = within) {
   )[asked, ]
 }
 
-# What was asked after a block is of the block's condition.
+# A questionnaire after a block belongs to the block's condition.
 raw <- subset(read.csv(file.path(folder, "scores.csv")), questionnaire == "load" & score == "raw")
 about <- unique(results[c("participant", "block", "condition")])
 raw <- merge(raw, about, by = c("participant", "block"))
@@ -40,8 +41,8 @@ raw[["load raw"]] <- raw$value
 raw$occasion <- raw$step
 
 found <- suppressMessages(rbind(
-  test(results, "movement_time", "condition"),  # the question of the study
-  test(results, "movement_time", "block"),      # first or second: what is learnt
+  test(results, "movement_time", "condition"),  # the study's research question
+  test(results, "movement_time", "block"),      # first or second: learning
   test(results, "movement_time", c("block", "sequence"), "sequence"),
   test(results, "movement_time", c("block", "distance"), "distance"),
   test(results, "movement_time", c("block", "far_side"), "far_side"),

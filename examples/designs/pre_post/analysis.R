@@ -1,27 +1,27 @@
-# The report's tests of movement time once more, with afex:
+# Repeats the report's tests of movement time with afex:
 #
 #   labcrane export data --to tables --set streams=none --out tables
 #   Rscript analysis.R tables
 #
-# It prints them, and writes them into analysis.csv. The report's are tables/anova.csv; those "with
-# pairs' means taken away" are not repeated here.
+# It prints the results and writes them to analysis.csv. The report's own results are in
+# tables/anova.csv. The tests "with pairs' means taken away" are not repeated here.
 
 suppressPackageStartupMessages(library(afex))
 
 folder <- c(commandArgs(TRUE), "tables")[1]
 trials <- read.csv(file.path(folder, "trials.csv"), na.strings = "")
 results <- subset(trials, practice == 0 & outcome == "success" & !is.na(movement_time))
-if ("presentation_failed" %in% names(results)) {  # pictures stood still: no result either
+if ("presentation_failed" %in% names(results)) {  # the picture froze: not a valid result
   results <- subset(results, is.na(presentation_failed) | presentation_failed == 0)
 }
 
-# A phase is a block of a session: the tests and the training. Positions of pairs of targets count
-# from 1 in each.
+# A phase is a block of a session: a test or the training. Number the pairs of targets from 1 in
+# each phase.
 results$phase <- paste(results$session, results$block)
 rank <- function(x) match(x, sort(unique(x)))
 results$sequence <- ave(results$sequence, results$participant, results$phase, FUN = rank)
 
-# Every effect of a design that is of all factors in `of`, alone and with the groups.
+# Test the design and return the effects that involve all factors in `of`, alone and with the group.
 test <- function(data, measure, within, of = within) {
   fit <- aov_ez(
     "participant", measure, data, within = within, between = "group", fun_aggregate = mean
