@@ -1,1 +1,1 @@
-"""Benchmarks of labcrane, each time beside a bare reference in the same run."""
+"""Benchmarks of labcrane, each compared with a bare reference in the same run."""

@@ -2,13 +2,13 @@
 
     python -m benchmarks [--check] [--only tick,start_up] [--brief]
 
-Writes ``benchmarks/RESULTS.md``, with the machine and the date; rows of benchmarks that were left
-out are kept as they were. Absolute figures of a shared computer are noise: every row has a bare
-reference that ran beside it, and the ratio is what counts, with the most that is promised of it.
-With ``--check``, the exit status is 1 when a promise is missed, and each that is missed is named.
-A benchmark that cannot be run is missed too, with the reason, and the others go on.
-``--brief`` runs each for an instant, to see that it can be run: its figures mean nothing and are
-not written. All of them take three quarters of an hour; the computer should be idle.
+Writes ``benchmarks/RESULTS.md`` with the machine and the date; rows of omitted benchmarks stay
+unchanged. Absolute figures from a shared computer are noisy. Every row therefore has a bare
+reference from the same run, the ratio to it, and the largest ratio that is allowed. With
+``--check``, the exit status is 1 when a ratio exceeds its limit, and each such row is listed. A
+benchmark that cannot run counts as failed, with the reason, and the others continue. ``--brief``
+runs each for an instant, to check that it can run; its figures are meaningless and not written.
+All benchmarks together take 45 minutes; the computer should be idle.
 """
 
 import argparse
@@ -33,7 +33,7 @@ HEAD = "| benchmark | figure | labcrane | reference | | ratio | at most | measur
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run what was asked for, and write the table; 1 when a promise is checked and missed.
+    """Run the chosen benchmarks and write the table; 1 when a checked ratio exceeds its limit.
 
     It is 1, too, when a benchmark could not be run.
     """
@@ -92,7 +92,7 @@ def line(subject: str, row: Row) -> str:
 
 
 def machine() -> str:
-    """Return what was measured on, in a few words."""
+    """Return a short description of the computer."""
     model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -119,12 +119,12 @@ def write(lines: dict[str, list[str]]) -> None:
 
 
 def head() -> str:
-    """Return what stands above the rows."""
+    """Return the text above the rows."""
     return (
         "# Benchmarks\n\n"
-        f"Made by `python -m benchmarks` with labcrane {version('labcrane')}. Each figure stands "
-        "beside a bare reference that\nran in the same minutes; the ratio is what counts, and "
-        "`--check` fails where it is above what is promised.\n\n"
+        f"Made by `python -m benchmarks` with labcrane {version('labcrane')}. Each figure is "
+        "compared with a bare reference\nthat ran in the same minutes. Compare the ratios; "
+        "`--check` fails where a ratio exceeds its limit (*at most*).\n\n"
         f"{HEAD}\n|{'---|' * (HEAD.count('|') - 1)}\n"
     )
 

@@ -1,12 +1,12 @@
-"""Analysis: how long export and report take per participant, and how that grows.
+"""Analysis: how long export and report take per participant, and how the time grows.
 
     python -m benchmarks.analysis [--participants 36] [--movements 4]
 
-Records one simulated session for each length, copies it to as many participants as asked, and runs
-the report and two exports in processes of their own. Time per participant and per movement should
-stay as it is when either grows, and so should the memory. Times are the processor's, so that what
-else runs on the computer matters little. The first participant, with whom libraries are loaded, is
-told from the others by cohorts of two sizes.
+Records one simulated session for each length, copies it to the given number of participants, and
+runs the report and two exports in separate processes. Time per participant, time per movement and
+memory should not change when either number grows. Times are processor times, so that other
+programs on the computer matter little. Cohorts of two sizes separate the first participant, for
+whom libraries are loaded, from the others.
 """
 
 import argparse
@@ -139,7 +139,7 @@ def rows(*, brief: bool = False) -> list[Row]:
 
 
 def measured(words: Sequence[str], data: Path) -> Use:
-    """Run a command on a data folder, in one process: only its own time is told."""
+    """Run a command on a data folder, in one process, because only its own time is measured."""
     with tempfile.TemporaryDirectory() as out:
         options = ["--out", f"{out}/out", *words[1:], "--include", "simulated", "--workers", "1"]
         return used(words[0], str(data), *options)

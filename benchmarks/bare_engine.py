@@ -1,4 +1,4 @@
-"""The engine alone, with what a crane needs: the least that a tick could cost."""
+"""The engine alone, with the settings that a crane needs: the minimum cost of a tick."""
 
 import tempfile
 from pathlib import Path
@@ -13,7 +13,7 @@ PASSES = 200
 
 
 class BareEngine:
-    """Four motors set, one step, four joints read, with nothing of labcrane in between.
+    """Set four motors, make one step and read four joints, without any code of labcrane.
 
     Parameters
     ----------

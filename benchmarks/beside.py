@@ -1,12 +1,12 @@
-"""Ticks and sound while other things go on beside them: rude clients, a laboratory, busy cores.
+"""Ticks and sound under load: misbehaving clients, a laboratory's streams, busy cores.
 
     python -m benchmarks.beside
 
-The loop's lateness is that of the ticks of a session in real time, with what goes on and without,
-in turns. "Not noticed" means: 99 % of ticks are late by at most a quarter of a tick more. Blocks of
-sound that are missed on a busy computer are counted beside those for which the computer itself
-stood still, as a program with a higher priority saw it. Needs jackd and real-time priorities for
-the sound; nothing leaves this computer.
+The loop's lateness is that of the ticks of a real-time session, alternately with and without the
+load. "Not noticed" means that 99 % of ticks are late by at most a quarter of a tick more. Missed
+blocks of sound on a busy computer are compared with those during which the computer itself stopped,
+as a program with a higher priority measured it. The sound needs jackd and real-time priorities.
+Nothing leaves this computer.
 """
 
 import os
@@ -33,7 +33,7 @@ PERIOD_S = 1024 / 48000
 
 
 def rows(*, brief: bool = False) -> list[Row]:
-    """Return all figures; in a process of its own, for the network that liblsl is told of."""
+    """Return all figures, from a separate process with its own network settings of liblsl."""
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.beside", "--json", *(["--brief"] if brief else [])],
         check=True, stdout=subprocess.PIPE, text=True,
@@ -108,7 +108,7 @@ def clients(folder: Path, count: int) -> list[Row]:
 
 
 def laboratory(folder: Path, length: int) -> Row:
-    """Record 64 channels at 1 kHz, gaze and markers beside a session, and nothing beside it."""
+    """Run sessions with and without recording of 64 channels at 1 kHz, gaze and markers."""
     from faults.sessions import labcrane, unique  # noqa: PLC0415
     from faults.test_load import NEEDS, a_study  # noqa: PLC0415
 
@@ -160,7 +160,7 @@ def sound(folder: Path, length: float) -> Row:
 
 
 def main() -> None:
-    """Measure all, and print it for people, or for the process that asked for it."""
+    """Measure everything, and print it for people or for the calling process."""
     sys.path.insert(0, str(TESTS))
     with tempfile.TemporaryDirectory(prefix="labcrane-beside-") as name:
         folder = Path(name)

@@ -1,15 +1,15 @@
-"""Cohort of a simulated study beside bare PyBullet ticks: one core, two, memory, and power.
+"""Simulated cohort compared with bare PyBullet ticks: one core, two cores, memory, and power.
 
     python -m benchmarks.cohort [--participants 36]
 
-Every participant of the aiming study is simulated and consolidated; after each, the engine alone
-makes as many ticks: four motors set, one step, four joints read, with the settings that a crane
-needs by itself (200 solver passes, no residual threshold, limits of 1e7 N m), and with the 400
-passes that labcrane's crane is given. Times of one core are the process's own.
+Every participant of the aiming study is simulated and consolidated. After each, the engine alone
+makes the same number of ticks: four motors set, one step, four joints read. It runs with the
+settings that a crane needs by itself (200 solver passes, no residual threshold, limits of
+1e7 N m), and with the 400 passes of labcrane's crane. Times of one core are the process's own.
 
 The crane study is simulated by the command, with two workers and all start-up. Its 15 s on two idle
 cores are 30 s of the processor, and those 0.35 of what bare ticks take where 36 us is one. For
-power, cohorts of two numbers are drawn from a pool, and what one more takes gives a thousand.
+power, cohorts of two sizes are sampled from a pool; the time of one more gives that of a thousand.
 """
 
 import argparse
@@ -32,7 +32,7 @@ AIMING = Path(__file__).parents[1] / "protocols" / "aiming" / "protocol.yaml"
 CRANE_PILOT = AIMING.parents[1] / "crane_pilot" / "protocol.yaml"
 PASSES = (200, 400)
 SAMPLE = 100_000
-"""Bare ticks from which as many as a cohort's are told."""
+"""Number of bare ticks from which the time of a cohort's ticks is extrapolated."""
 
 PILOT_TIMES = 0.35
 """What the crane study's 36 may take beside bare ticks."""
@@ -65,7 +65,7 @@ def rows_of(participants: int, more: int = MORE) -> list[Row]:
 
 
 def one_core(folder: Path, participants: int) -> list[Row]:
-    """Simulate everybody here, with bare ticks in between."""
+    """Simulate all participants in this process, with bare ticks in between."""
     study = load(AIMING, discover())
     simulate(SimulationJob(AIMING, None, folder / "first", "P001"))  # loads, and compiles once
     ours, ticks, stepping = 0.0, 0, Stepping()

@@ -1,8 +1,8 @@
-"""Installations, lean and full, each in an environment anew: seconds and megabytes.
+"""Installations, lean and full, each in a fresh environment: seconds and megabytes.
 
     python -m benchmarks.install
 
-Downloads count as far as pip has not kept them; run it twice for the time without them.
+The time includes downloads that pip has not cached; run it twice for the time without them.
 """
 
 import subprocess
@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def installed(what: str, folder: Path) -> tuple[float, float, int]:
-    """Return how long it takes in s, what it adds in MB, and how many projects it brings."""
+    """Return the duration in s, the added size in MB, and the number of installed projects."""
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
     python = folder / "bin" / "python"
     (packages,) = folder.glob("lib/python*/site-packages")

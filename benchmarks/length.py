@@ -1,10 +1,10 @@
-"""Length: an hour at 1 kHz with 40 columns, put together, read and exported.
+"""Length: an hour at 1 kHz with 40 columns, consolidated, read and exported.
 
     python -m benchmarks.length [--minutes 60]
 
-Each figure is of a process of its own: seconds of the processor, so that what else runs on the
-computer matters little, and MB at most. What is promised of them are figures, so that they stand
-beside these; two times stand beside a bare library, too.
+Each figure comes from a separate process: processor seconds, so that other programs on the computer
+matter little, and the maximum of memory in MB. The references are the performance targets, and for
+two of the times also a bare library.
 """
 
 import argparse

@@ -2,9 +2,9 @@
 
     python -m benchmarks.pages
 
-The cost is that of a session with its pages and the examiner's page open in four browsers, beside
-one of the same study without pages, in turns: processor time of the session's process, and how late
-its ticks are. The browsers are the last in this computer's line, as if they were on others.
+Sessions with the experimenter's page open in four browsers alternate with sessions of the same
+study without pages. The cost is the processor time of the session's process and the lateness of its
+ticks. The browsers have the lowest priority, as if they ran on other computers.
 """
 
 import os
@@ -109,13 +109,13 @@ def a_session(
 
 
 def link_of(launcher: "subprocess.Popen[str]") -> str:
-    """Return the link of the examiner's page, as the launcher prints it."""
+    """Return the link of the experimenter's page, as the launcher prints it."""
     said = (line for line in launcher.stdout if "supervisor page: " in line)
     return next(said).split("supervisor page: ")[1].split()[0]
 
 
 def watch(browser: object, link: str) -> None:
-    """Open the examiner's page in four windows, each drawing as if it alone were there."""
+    """Open the experimenter's page in four windows, each drawing as if it were the only one."""
     from faults.sessions import wait_for  # noqa: PLC0415
     from pages.room import text  # noqa: PLC0415
 

@@ -1,11 +1,11 @@
-"""Lateness of the loop with a whole laboratory beside it, with ``--real-time`` and without.
+"""Lateness of the loop with the load of a whole laboratory, with and without ``--real-time``.
 
     python -m benchmarks.real_time [SECONDS]
 
-Beside it: the pages, two software views, a sound by a JACK server, and 64 channels at 1 kHz that
-are recorded. The reference is an empty loop that ticked alone before. What is promised is promised
-of ``--real-time``; lines above the table say how late it is without. Needs jackd and real-time
-priorities; nothing leaves this computer.
+The load: the pages, two software views, a sound by a JACK server, and the recording of 64 channels
+at 1 kHz. The reference is an empty loop that ticked alone before. The performance targets apply to
+``--real-time``; lines above the table give the lateness without it. Needs jackd and real-time
+priorities. Nothing leaves this computer.
 """
 
 import os
@@ -38,7 +38,7 @@ views:
 
 
 def rows(*, brief: bool = False) -> list[Row]:
-    """Return all figures; in a process of its own, for the network that liblsl is told of."""
+    """Return all figures, from a separate process with its own network settings of liblsl."""
     seconds = 5.0 if brief else SECONDS
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.real_time", "--json", str(seconds)],
@@ -84,7 +84,7 @@ def measure(folder: Path, seconds: float) -> list[Row]:
 
 
 def session(folder: Path, name: str, seconds: float, words: tuple[str, ...]) -> np.ndarray:
-    """Run a session with everything beside it; return how late its ticks were, in ms."""
+    """Run a session with the whole load; return how late its ticks were, in ms."""
     from faults.sessions import labcrane, unique  # noqa: PLC0415 - needs the path
     from faults.test_load import NEEDS, a_study  # noqa: PLC0415
 
@@ -112,7 +112,7 @@ def session(folder: Path, name: str, seconds: float, words: tuple[str, ...]) -> 
 
 
 def main() -> None:
-    """Measure all, and print it for people, or for the process that asked for it."""
+    """Measure everything, and print it for people or for the calling process."""
     sys.path.insert(0, str(TESTS))
     numbers = [float(word) for word in sys.argv[1:] if word != "--json"]
     with tempfile.TemporaryDirectory(prefix="labcrane-real-time-") as name:

@@ -1,4 +1,4 @@
-"""Ticks and pictures of the rescue scenarios beside those of the kinematic study.
+"""Ticks and pictures of the rescue scenarios, compared with those of the kinematic study.
 
     python -m benchmarks.scenario
 
@@ -111,7 +111,7 @@ def times(study: Study, folder: Path, count: int) -> tuple[np.ndarray, Frame, Ru
 
 
 def rows(*, brief: bool = False) -> list[Row]:
-    """Return what ticks and pictures of scenarios take beside those of the kinematic study."""
+    """Return the times of scenarios' ticks and pictures, relative to the kinematic study."""
     rounds, ticks = (1, dict.fromkeys(TICKS, 2 * WARM_UP)) if brief else (ROUNDS, TICKS)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -170,7 +170,7 @@ def picture_row(there: dict[str, Study], frames: dict[str, tuple[Frame, Run]]) -
 
 
 def placed(name: str) -> str:
-    """Return what stands in a scenario, as sessions tell views."""
+    """Return the objects of a scenario in the form in which sessions send them to views."""
     return write_placed(place_objects(load_scene(RETRIEVAL / "scenes" / f"{name}.yaml"), 1))
 
 

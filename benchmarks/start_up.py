@@ -2,10 +2,9 @@
 
     python -m benchmarks.start_up
 
-Processes alternate; of each kind the fastest counts, which is the one that nothing disturbed. Of
-rehearsals the slowest counts: nobody at a desk has an idle computer.
-All modules are compiled, as pip leaves them: a checkout may not be, and not be allowed to keep what
-was compiled.
+Processes alternate. The fastest of each kind counts, because it was disturbed least. For rehearsals
+the slowest counts, because an office computer is not idle. All modules are compiled, as after an
+installation with pip; a checkout may be uncompiled and read-only.
 """
 
 import os
@@ -32,7 +31,7 @@ ALLOWED_S = {"labcrane check": 0.1}
 REHEARSAL = ["-m", "labcrane", "check", str(AIMING), "--rehearse"]
 REHEARSALS = 3
 PATIENCE_S = 15.0
-"""How long somebody at a desk is to wait for a rehearsal of the aiming study, at most."""
+"""Longest acceptable wait for a rehearsal of the aiming study."""
 
 
 def rows(*, brief: bool = False) -> list[Row]:

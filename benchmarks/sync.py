@@ -2,12 +2,13 @@
 
     python -m benchmarks.sync [--seconds 240] [--restarts 8] [--draws 3] [--page PAGE]
 
-First devices and clocks that are unkind, with parameters drawn at random and known truth (no
-processes): what the report promises of each, and whether that held. Then, with processes: a device
-with another clock sends the true time of each sample; a program on this computer sends markers with
-theirs. Both are recorded by labcrane's recorder and corrected. Beside it stands what
-pyxdf makes of the same samples with clock offsets collected as LabRecorder does. Needs gcc; takes
-a little over twice the seconds given; with 0, the table is left out. Nothing leaves this computer.
+The first part simulates misbehaving devices and clocks with random parameters and known true times.
+It compares the error of each with the uncertainty that the report states. The second part uses
+processes: a device with another clock sends the true time of each sample, and a program on this
+computer sends markers with their true times. labcrane's recorder records and corrects both. The
+reference is pyxdf on the same samples, with clock offsets collected as LabRecorder does. Needs gcc;
+takes a little over twice the seconds given; with 0, the table is omitted. Nothing leaves this
+computer.
 """
 
 import argparse
@@ -68,8 +69,8 @@ BUSY = (Case("100 ppm, both cores busy", 0.02), Case("chunks, both cores busy", 
 
 
 def rows(*, brief: bool = False) -> list[Row]:
-    """Return what is promised of unkind devices, of each case and of restarts; five minutes."""
-    # In a process of its own: whoever has loaded liblsl has told it which network to use.
+    """Return the rows of misbehaving devices, of each case and of restarts; takes five minutes."""
+    # In a separate process, because liblsl reads its network settings once, when it is loaded.
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.sync", *(INSTANT if brief else SHORT), "--json"],
         check=False, capture_output=True, text=True,
@@ -90,7 +91,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=240.0)
     parser.add_argument("--restarts", type=int, default=8)
     parser.add_argument("--draws", type=int, default=3)
-    parser.add_argument("--page", type=Path, help="where the table of unkind devices is written")
+    parser.add_argument("--page", type=Path, help="file for the table of misbehaving devices")
     parser.add_argument("--json", action="store_true", help="end with all rows in one line")
     options = parser.parse_args()
     logging.getLogger("pyxdf").setLevel(logging.ERROR)  # it finds the irregular streams odd
@@ -114,7 +115,7 @@ def main() -> int:
 
 
 def unkind(draws: int, page: Path | None) -> list[Row]:
-    """Print a line for each unkind device; return what is promised. ``page`` gets the table."""
+    """Print a line for each misbehaving device; return its rows and write the table to ``page``."""
     from streams.strangers import ALL  # noqa: PLC0415
     from streams.unkind_score import score, shortcomings, table_line  # noqa: PLC0415 - the path
 
@@ -135,7 +136,7 @@ def unkind(draws: int, page: Path | None) -> list[Row]:
 
 
 def of_devices(every: Sequence["Score"]) -> list[Row]:
-    """Return the error of each unkind device beside its limit, or beside what is stated of it."""
+    """Return each misbehaving device's error, compared with its limit or stated uncertainty."""
     found = []
     for device in dict.fromkeys(one.row for one in every):
         draws = [one for one in every if one.row == device]
@@ -160,7 +161,7 @@ def summary(every: Sequence["Score"]) -> str:
 
 
 def promises(every: Sequence["Score"]) -> list[Row]:
-    """Return what is promised of all draws of unkind devices together."""
+    """Return the rows of all draws of misbehaving devices together."""
     from streams.unkind_score import (  # noqa: PLC0415 - needs the path
         coverage,
         misnamed,
@@ -175,7 +176,7 @@ def promises(every: Sequence["Score"]) -> list[Row]:
     print(summary(every))
     broken, worse = sum(bool(shortcomings(one)) for one in every), len(worse_rows(every))
     uncovered = 100.0 * (1.0 - coverage(every))
-    # Where no fault is there and none is named, nothing is known of how they are named.
+    # Without a fault, present or reported, the reports of faults cannot be assessed.
     unnamed = 100.0 * (1.0 - min((min(each) for each in named.values()), default=math.nan))
     allowed = [100.0 * (1.0 - share) for share in (COVERED, NAMED)]
     document = "docs/accuracy.md"

@@ -8,7 +8,7 @@ from dataclasses import astuple, dataclass
 
 @dataclass(frozen=True)
 class Row:
-    """One figure, and what is promised of it.
+    """One figure and its limit.
 
     Attributes
     ----------
@@ -19,12 +19,12 @@ class Row:
     reference
         What the reference is.
     limit
-        What the ratio may be at most: a figure of which nothing is promised is no row.
+        Maximum of the ratio. A figure without a limit is not a row.
 
     Raises
     ------
     ValueError
-        The limit is none that a ratio could miss.
+        No ratio could exceed the limit.
     """
 
     subject: str
@@ -36,7 +36,7 @@ class Row:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.limit < math.inf:
-            raise ValueError(f"{self.subject}: {self.what}: {self.limit} is no limit for a ratio")
+            raise ValueError(f"{self.subject}: {self.what}: {self.limit} cannot limit a ratio")
 
     @property
     def ratio(self) -> float:
@@ -45,7 +45,7 @@ class Row:
 
     @property
     def kept(self) -> bool:
-        """Whether the ratio is within its limit; one that is no number is not."""
+        """Whether the ratio is within its limit; NaN is not."""
         return self.ratio <= self.limit
 
 
@@ -69,7 +69,7 @@ def show(rows: Iterable[Row]) -> None:
 
 
 def dumped(rows: Iterable[Row]) -> str:
-    """Return rows as one line, for the process that asked for them."""
+    """Return rows as one line, for the calling process."""
     return json.dumps([astuple(row) for row in rows])
 
 

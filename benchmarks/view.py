@@ -6,8 +6,8 @@ The bare scene is the same stage, its shader and shadows, drawn again without an
 changed. The view besides places machine and cues, writes text, and computes areas of interest.
 Rounds alternate, so that a wandering machine moves both figures together. The delay is counted in
 frames: every frame has a colour of its own, and the colour that the window has after each is read.
-A view that sends pictures to the supervisor's page does so a few times a second; what is measured
-is a picture that is sent, beside one that is not. A thread of its own codes it, in the time shown.
+A view sends pictures to the experimenter's page a few times a second; a frame whose picture is sent
+is compared with one whose picture is not. A thread of its own codes it, in the time shown.
 """
 
 import time

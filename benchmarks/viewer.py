@@ -1,11 +1,11 @@
-"""Viewer: an hour at 240 Hz with 64 EEG channels, opened, jumped about in, and its memory.
+"""Viewer: opening an hour at 240 Hz with 64 EEG channels, jumping in it, and memory.
 
     python -m benchmarks.viewer [--minutes 60]
 
-A recorded session is repeated until it is an hour long, and EEG is put beside it; `labcrane view`
-shows it in headless Chromium. A jump is from the order in the browser until the frame after the one
-in which the machine was painted as it was recorded: on this computer's processor, where there is no
-graphics card. Needs Chromium.
+A recorded session is repeated until it is an hour long, and EEG is added; `labcrane view` shows it
+in headless Chromium. A jump lasts from the command in the browser until the frame after the one in
+which the machine was painted in its recorded pose. Without a graphics card, the processor draws.
+Needs Chromium.
 """
 
 import argparse
@@ -180,7 +180,7 @@ def looked(file: Path, browser: object) -> Looked:
         while not browser.execute_script(LAST):
             time.sleep(0.01)
         opened = time.perf_counter() - began
-        for channel in range(KEPT + 1):  # as many as are kept: what is read anew replaces one
+        for channel in range(KEPT + 1):  # fills the cache: each further read replaces one
             curves(browser, channel)
         browser.set_script_timeout(120)
         draw, process = random.Random(23), psutil.Process(viewer.pid)

@@ -116,7 +116,7 @@ def test_the_table_that_is_kept_has_the_head_and_the_columns_that_are_written_no
 @pytest.mark.parametrize("limit", [float("inf"), float("nan"), 0.0])
 def test_a_row_without_a_limit_that_can_be_missed_is_none(limit: float) -> None:
     row = importlib.import_module("benchmarks.table").Row
-    with pytest.raises(ValueError, match=f"a: b: {limit} is no limit for a ratio"):
+    with pytest.raises(ValueError, match=f"a: b: {limit} cannot limit a ratio"):
         row("a", "b", 1.0, 1.0, "c", limit)
 
 

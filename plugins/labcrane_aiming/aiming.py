@@ -304,11 +304,11 @@ class Aiming(Task):
         return RUNNING, None
 
     def _is_tap(self, elapsed: float) -> bool:
-        """Whether a press now says where somebody meant to come to.
+        """Whether a press now is the tap that ends the movement.
 
-        A second press or a bouncing button is none. Whoever is in the target without having moved,
-        as after a trial that is repeated, may say so, but not at once: the press may be the
-        last movement's.
+        A second press or a bouncing button is not a tap. If the tip is in the target without having
+        moved, as after a repeated trial, a press counts only after a while: it may belong to the
+        last movement.
         """
         settings, movement = self._settings, self._movement
         return movement.begun or (movement.inside and elapsed >= settings.rest_s)
@@ -317,7 +317,7 @@ class Aiming(Task):
         if self._settings.end != "rest_anywhere":
             return True
         movement = self._movement
-        # Where the last movement ended may be beyond that share of the way of a repeated one.
+        # In a repeated trial, the tip may start beyond that share of the way.
         return movement.done >= self._settings.rest_after and (movement.inside or movement.begun)
 
 

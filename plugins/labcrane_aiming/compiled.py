@@ -1,4 +1,4 @@
-"""Compiled task: the ticks of a movement in which nothing is to be told."""
+"""Compiled task: the ticks of a movement without an event."""
 
 import math
 

@@ -69,8 +69,8 @@ class AimingSettings(Settings):
     """Fraction of the way after which a rest ends a movement, when ``end`` is ``rest_anywhere``."""
 
     onset_speed: Annotated[PositiveFloat, Unit("m/s")] = 0.02
-    """Tip speed above which a movement has begun, in metres per second. Set it by the noise of the
-    machine's sensors: above the speed that they tell of a tip at rest, and no higher."""
+    """Tip speed above which a movement has begun, in metres per second. Set it just above the speed
+    that the noise of the machine's sensors shows for a tip at rest."""
 
     onset_hold_s: NonNegativeFloat = 0.1
     """How long the tip must stay above the onset speed, in seconds. The event ``movement.onset``
@@ -118,7 +118,7 @@ class AimingSettings(Settings):
         twice = [each for each in distances if distances.count(each) > 1]
         if twice and not was_run(info):
             raise ValueError(
-                f"{twice[0]:g} m is there twice; write each distance once, and decimals with a "
+                f"{twice[0]:g} m is listed twice; write each distance once, and decimals with a "
                 "point: [1.5, 2.5, 4]"
             )
         return distances

@@ -29,10 +29,10 @@ PERSON = ("age", "sex", "handedness", "group")
 class Bids(Exporter):
     """Motion with one tracking system per device, EEG, eye tracking, physio, events, phenotype.
 
-    EEG is written as BrainVision files, sample by sample as it was recorded; each event is at the
-    sample that was taken when it happened, by the corrected clock. A questionnaire that somebody
-    was asked more than once is in ``beh`` with its trials. Streams of texts, and of numbers
-    without a rate, have no place in BIDS: the README names them.
+    EEG is written as BrainVision files, with the samples as recorded. Each event is at the sample
+    that was taken at the same time, by the corrected clock. A questionnaire that a participant
+    answered more than once is in ``beh`` with its trials. BIDS has no place for streams of texts or
+    of numbers without a rate: the README lists them.
     """
 
     shared = (

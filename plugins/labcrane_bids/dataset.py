@@ -140,7 +140,7 @@ def _people(reader: "csv.DictReader[str]", path: Path) -> dict[str, dict[str, st
             )
         if (name := row["participant"]) in people:
             raise ProtocolError(
-                f"{path}, line {reader.line_num}: {name!r} is there twice; keep one row"
+                f"{path}, line {reader.line_num}: {name!r} is listed twice; keep one row"
             )
         people[name] = {name: cell for name, cell in row.items() if cell}
         if "age" in people[name]:
@@ -204,7 +204,7 @@ def _description(path: Path) -> dict[str, Any]:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
-        raise ProtocolError(f"{path} is no JSON: {error}; correct it there") from error
+        raise ProtocolError(f"{path} is not valid JSON: {error}; correct the file") from error
     if not isinstance(content, dict):
         raise ProtocolError(
             f"{path} holds {type(content).__name__}; it must hold an object with a key for each "

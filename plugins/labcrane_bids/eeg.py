@@ -52,7 +52,7 @@ def write_eeg(
     )]  # fmt: skip
     path.parent.mkdir(exist_ok=True)
     table = _events(events, signal, session)
-    # What is no voltage is not scaled; channels.tsv says what it is.
+    # Only voltages are scaled; channels.tsv states the unit of the others.
     factors = np.where(electric, 1e6 * scale, scale)
     write_brainvision(
         path,

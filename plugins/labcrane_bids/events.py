@@ -28,12 +28,12 @@ END = "trial.end"
 FAILED = "presentation_failed"
 
 MARK = "annotation"
-"""What somebody marked afterwards: a row of that type, and a column of its text where there is
-any."""
+"""An annotation that was added after the recording: a row of that type, and a column with its text
+if there is any."""
 
 COLUMNS = ("trial", "attempt", "block", "practice", "counted", "outcome", "pair", "direction")
-"""What of an event's data becomes a column of its own; of an event in a trial also what the trial's
-start says."""
+"""Items of an event's data that become columns; an event in a trial also has those of the trial's
+start."""
 
 WHOLE = ("trial", "attempt", "block", "practice", "counted", "void", FAILED, REPEAT)
 """Columns of whole numbers; truth is 1."""
@@ -46,8 +46,8 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
     start lasts until its end, which is not known of one whose process died; everything else is a
     moment. ``presentation_failed`` is n/a of what is in no row of the trial table, and where
     nothing was to be shown. ``response_time`` is the reaction time: from the trial's start to the
-    first stick beyond its dead zone. What somebody marked afterwards is an ``annotation`` with its
-    text.
+    first stick beyond its dead zone. Annotations that were added after
+    the recording have the type ``annotation`` and their text.
     """
     import pandas as pd
 
@@ -127,7 +127,7 @@ def event_description(
     """
     types = hed_sidecar(table["trial_type"])
     hed = {name: f"{tags.removesuffix(')')}, {{{REPEAT}}})" for name, tags in types["HED"].items()}
-    marked = {MARK: {"Description": "what somebody wrote into the recording afterwards"}}
+    marked = {MARK: {"Description": "text of an annotation that was added after the recording"}}
     return {
         **(marked if MARK in table else {}),
         "onset": {"Description": "from the first sample of motion", "Units": "s"},

@@ -1,7 +1,7 @@
 """Questionnaires of the recordings: a table and its description for each.
 
-BIDS 1.11 allows one row per participant in ``phenotype``. A questionnaire that somebody was asked
-more often is in ``beh`` instead: one table per session, one row for each time, with its trial.
+BIDS 1.11 allows one row per participant in ``phenotype``. A questionnaire that a participant
+answered more often is in ``beh`` instead: one table per session, one row per time, with its trial.
 """
 
 import json
@@ -171,7 +171,7 @@ def _of_forms(forms: Mapping[str, Sequence[str]]) -> dict[str, Any]:
     if len(described) == 1:
         return dict(described[0][0])
     levels = {}
-    if all("Levels" in about for about, _ in described):  # numbers are no level of any
+    if all("Levels" in about for about, _ in described):  # numbers have no levels
         levels = {key: word for about, _ in described for key, word in about["Levels"].items()}
     said = "; ".join(f"of {', '.join(asked)}: {_in_words(about)}" for about, asked in described)
     return {"Description": f"asked in {len(described)} forms; {said}"} | (
@@ -208,7 +208,7 @@ def age_code(years: float) -> str:
 def _row(subject: str, answers: "pd.DataFrame") -> dict[str, Any]:
     rows = answers.to_dict("records")
     first = rows[0]
-    # A line of the table is one row, whatever somebody wrote.
+    # Line breaks in an answer must not break the table's row.
     given = {_column(row["item"]): " ".join(row["text"].split()) or _answer(row) for row in rows}
     missing = [f"{row['item']}: {row['missing']}" for row in rows if row["missing"]]
     return {

@@ -30,7 +30,7 @@ with the head."""
 def continuous_recordings(
     session: SessionRecord, settings: BidsSettings
 ) -> Iterator[tuple[str, Iterator[list[FloatArray]], dict[str, Any]]]:
-    """Yield recording label, samples and description of each stream that is no EEG."""
+    """Yield recording label, samples and description of each stream except EEG."""
     zero = first_tick(session)
     eyes = 0
     for stream in _others(session):
@@ -92,7 +92,7 @@ def _recording(
         about["RecordedEye"] = "cyclopean"
         about["SampleCoordinateSystem"] = settings.gaze_system or by_unit or "custom"
         if about["SampleCoordinateSystem"] == "custom":
-            said = f"in {unit or 'no stated unit'}; of which picture, nobody has said"
+            said = f"in {unit or 'no stated unit'}; the picture that it refers to is unknown"
             about["SampleCoordinateSystemDescription"] = said
     units = ["s", *(stream.units[name] or "arbitrary" for name in labels)]
     for column, unit in zip(columns, units, strict=True):

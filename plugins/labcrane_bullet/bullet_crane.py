@@ -20,7 +20,7 @@ RESIDUAL = 0.0
 """All passes are made: with any threshold, joints go further through their limits."""
 
 TORQUE = 3
-"""Place of a motor's torque in what the engine says of a joint."""
+"""Index of the motor's torque in the engine's joint state."""
 
 ALL = 1.0 - 1e-9
 """Share of its torque at which a motor gives all that it has; the solver rounds."""
@@ -37,8 +37,8 @@ class BulletCrane(Crane):
     needed (docs/decisions/0090-torques-before-passes.md). When one of them is more than its motor
     has, or a joint is beyond its limit, the engine's motors and its solver find out what happens.
 
-    Every reset starts the engine anew: setting joints by hand leaves contact and solver caches
-    behind, and the same commands would then not give the same bits.
+    Every reset restarts the engine: setting joints by hand leaves contact and solver caches behind,
+    and the same commands would then not give the same bits.
     """
 
     has_drives = True
@@ -88,7 +88,9 @@ class BulletCrane(Crane):
         self._disconnect()
         client = pybullet.connect(pybullet.DIRECT)
         if client < 0:
-            raise PluginError("PyBullet could not start another engine; end other users of it")
+            raise PluginError(
+                "PyBullet could not start another engine; close other programs that use it"
+            )
         self._client = client
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=self._dt,

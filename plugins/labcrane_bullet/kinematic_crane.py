@@ -9,7 +9,7 @@ from labcrane.core import Crane, Twin
 class KinematicCrane(Crane):
     """The velocity law itself: the reference for every engine.
 
-    Speeds are integrated exactly. A joint that comes to its limit stands there, with speed zero.
+    Speeds are integrated exactly. A joint that reaches its limit stops there, with speed zero.
     """
 
     def twin(self) -> Twin:

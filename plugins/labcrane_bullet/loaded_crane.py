@@ -34,7 +34,7 @@ class LoadedBulletCrane(LoadedCrane, BulletCrane):
                 jointDamping=self._loaded.grapple.damping,
                 physicsClientId=self._client,
             )
-            # Every joint of the engine has a motor that brakes until it is told not to.
+            # By default, every joint of the engine has a motor that brakes; switch it off.
             pybullet.setJointMotorControl2(
                 self._body,
                 hinge,

@@ -95,7 +95,7 @@ def encode(
 ) -> tuple[int, bytes]:
     """Return identifier and data of a command; its sign says extend or retract, 0 block."""
     if not -FULL <= signal <= FULL:
-        raise ValueError(f"signal {signal} was asked of valve {valve}; it is -250 to 250")
+        raise ValueError(f"valve {valve}: signal {signal} is not within -250 to 250")
     if state is None:
         state = State.EXTEND if signal > 0 else State.RETRACT if signal < 0 else State.BLOCK
     data = bytes([abs(signal), 0xFF, 0x30 | state, *(NOT_AVAILABLE,) * 5])

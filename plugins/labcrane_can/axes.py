@@ -10,7 +10,7 @@ from labcrane_can.settings import ValveMap
 
 
 class PanelAxes:
-    """One array that is filled anew on every tick.
+    """One array that is refilled on every tick.
 
     Attributes
     ----------

@@ -94,8 +94,8 @@ class PanelCommands:
     def silent(self, now: float) -> str | None:
         """Return which valves fell silent at ``now`` in s while they were open, in words.
 
-        Panels may leave out valves that are shut, but no valve is shut by silence. Nor by what is
-        no number: that is told at once.
+        Panels may omit shut valves, but silence does not shut a valve. Neither does a value that is
+        not a number: it is reported at once.
         """
         if wrong := [asked.wrong for asked in self.asked.values() if asked.wrong]:
             return f"{'; '.join(wrong)}; see what is wrong with the panel"
@@ -128,7 +128,7 @@ class PanelCommands:
         self.why = why
 
     def forget(self) -> None:
-        """Let no command count that came before the bus was lost: the panel says them anew."""
+        """Discard all commands from before the bus was lost: the panel sends them again."""
         for asked in self.asked.values():
             asked.signal, asked.floats, asked.wrong, asked.time = 0.0, False, "", -math.inf
 
@@ -178,7 +178,7 @@ class PanelCommands:
         asked = self.asked[joint]
         value = (float(given) - self._neutral) / (self._full - self._neutral) * FULL
         if not math.isfinite(value):
-            asked.wrong = f"{name} is {given}, which is no number"
+            asked.wrong = f"{name} is {given}, which is not a number"
             self.refuse(asked.wrong)
         elif abs(value) > FULL * (1 + 1e-9):
             least = 2 * self._neutral - self._full

@@ -152,7 +152,7 @@ def _messages(path: Path | None) -> "list[Message]":
         found: Any = cantools.database.load_string(_text(path), "dbc", strict=False)
     # What cantools' parsers raise on damaged files is not documented.
     except (OSError, cantools.Error, *GARBLED) as error:
-        raise ProtocolError(f"map {str(path)!r} is no DBC file: {error}") from error
+        raise ProtocolError(f"map {str(path)!r} is not a DBC file: {error}") from error
     return list(found.messages)
 
 

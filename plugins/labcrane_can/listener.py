@@ -21,7 +21,7 @@ DIAL_AFTER_S, DIAL_S = 1.0, 0.5
 """Silence after which a socketcand server is dialled again, and how long that may take."""
 
 MOST_GARBLED = 20
-"""Lines in a row that are no frames, after which a bus is opened again."""
+"""Number of consecutive lines that are not frames, after which the bus is opened again."""
 
 AGAIN_S = 0.2
 """Time between attempts to open a bus that was lost."""
@@ -62,7 +62,7 @@ class Listener:
         self._shut()
 
     def _work(self) -> None:
-        """Read until it is over: whatever a bus brings about is told, and the bus opened anew."""
+        """Read until the end; report every failure of the bus, and open the bus again."""
         while not self._over.is_set():
             try:
                 self._read()
@@ -100,8 +100,8 @@ class Listener:
         except (ValueError, IndexError) as error:
             self._garbled += 1
             if self._garbled > MOST_GARBLED:
-                raise OSError(f"{MOST_GARBLED} lines in a row are no frames ({error})") from error
-            self._commands.refuse(f"the adapter's line is no frame ({error})")
+                raise OSError(f"{MOST_GARBLED} lines in a row are not frames ({error})") from error
+            self._commands.refuse(f"the adapter's line is not a frame ({error})")
             return None
         self._garbled = 0 if frame is not None else self._garbled
         return frame
@@ -113,7 +113,7 @@ class Listener:
             self._heard = now
         elif now - self._heard > DIAL_AFTER_S:
             self._heard = now
-            raise OSError(f"nothing was heard for {DIAL_AFTER_S:g} s; it is dialled again")
+            raise OSError(f"no data came for {DIAL_AFTER_S:g} s; the connection is being reopened")
 
     def _watch_flood(self, now: float, *, came: bool) -> None:
         self._count += came

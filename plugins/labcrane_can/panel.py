@@ -73,7 +73,7 @@ class CanPanel(InputDevice):
         for joint, place in self._places.items():
             valve = self._settings.valves[joint]
             if isinstance(valve, str):
-                return  # a DBC map says nothing of what the panel wants to hear
+                return  # a DBC map does not describe the messages that the panel expects
             node = self._settings.own_node
             estimated = PERCENT * openings[place] / FULL
             measured = PERCENT * speeds[place] / self._machine.speeds[place]

@@ -60,7 +60,7 @@ class CanReplay(InputDevice):
             at = int(back.argmin()) + 1
             raise ProtocolError(
                 f"the clock of {settings.file} goes back by {-back[at - 1]:g} s at its frame "
-                f"{at + 1}, so that nobody knows when what follows was sent; cut the log there"
+                f"{at + 1}, so the times of all later frames are unknown; cut the log there"
             )
 
     def open(self, run: Run) -> None:

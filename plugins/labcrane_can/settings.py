@@ -19,7 +19,7 @@ from labcrane import Machine, Settings
 from labcrane.core import JointName, Names, Once, Reference, StudyPath, WrongKey, was_run
 
 Node = Annotated[int, Field(ge=0, le=253)]
-"""Source address on the bus; 254 and 255 are no node."""
+"""Source address on the bus; 254 and 255 do not identify a node."""
 
 BUS = r"^[a-z0-9_]+:.+$"
 
@@ -78,7 +78,7 @@ class ValveMap(Settings):
         return named
 
     def needs(self, machine: Machine) -> Names:
-        self.provides(machine)  # a file that is no map is told with the protocol
+        self.provides(machine)  # the protocol's check reports a file that is not a map
         return {}
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
@@ -150,7 +150,7 @@ class CanSettings(ValveMap):
             return bus
         if not re.match(BUS, bus):
             raise ValueError(
-                f"{bus!r} is no bus; write interface:channel, as slcan:/dev/ttyACM0 or "
+                f"{bus!r} is not a bus; write interface:channel, as slcan:/dev/ttyACM0 or "
                 "socketcan:can0"
             )
         interface, _, channel = bus.partition(":")
@@ -158,13 +158,13 @@ class CanSettings(ValveMap):
             raise ValueError(f"{bus!r}: {why}")
         if interface == "socketcan" and not re.fullmatch(r"[^/\s]{1,15}", channel):
             raise ValueError(
-                f"{channel!r} is no network interface; write its name, as socketcan:can0, or for a "
-                "serial adapter slcan:/dev/ttyACM0"
+                f"{channel!r} is not a network interface; write its name, as socketcan:can0, or "
+                "for a serial adapter slcan:/dev/ttyACM0"
             )
         port = bus.partition("@")[2].partition(":")[2]
         if bus.startswith("socketcand:") and port and not port.isdecimal():
             raise ValueError(
-                f"{port!r} is no port; write socketcand:channel@host:port, or leave the port out"
+                f"{port!r} is not a port; write socketcand:channel@host:port, or omit the port"
             )
         return bus
 

@@ -102,7 +102,8 @@ def _signals(name: str, text: str) -> tuple[int, ...]:
         found = tuple(int(part) for part in text.split(",") if part.strip())
     except ValueError:
         raise ProtocolError(
-            f"--{name} {text!r} is no list of signals; write whole numbers with commas: 40,80,120"
+            f"--{name} {text!r} is not a list of signals; write whole numbers with commas: "
+            "40,80,120"
         ) from None
     if wrong := [signal for signal in found if signal <= 0]:
         raise ProtocolError(
@@ -143,7 +144,7 @@ def validate(
 
     if drive and machine is None:
         raise ProtocolError(
-            "--drive moves the segments of a machine; say of which: --machine ied_arm.yaml"
+            "--drive moves the segments of a machine; name the machine: --machine ied_arm.yaml"
         )
     if machine is not None and not drive:
         raise ProtocolError(f"--machine {machine} is only driven with --drive; add it")
@@ -276,8 +277,9 @@ def record(
 ) -> None:
     """Record a joint's steps for ``dmd fit``: from a CAN bus, a log of one, or LSL.
 
-    Every value is kept in raw/SEGMENT.csv as it comes. At the end, or at Ctrl-C, it is cut into
-    runs: SEGMENT.csv has them, steps/SEGMENT.csv every step and why one is no run.
+    Every value is written to raw/SEGMENT.csv as it arrives. At the end, or after Ctrl-C, the values
+    are cut into runs: SEGMENT.csv contains the runs; steps/SEGMENT.csv contains every step, and why
+    a step is not a run.
     """
     from labcrane_dmd.bench.sources import CanValues, kept, read_bus, read_log, read_lsl, read_raw
     from labcrane_dmd.bench.steps import cut, write_runs
@@ -286,7 +288,7 @@ def record(
         raise ProtocolError("say where the values come from: one of --bus, --log and --lsl")
     if (folder / f"{segment}.csv").exists() and (log is None or log.suffix != ".csv"):
         raise ProtocolError(
-            f"{folder / f'{segment}.csv'} is there already, and recordings are not written over; "
+            f"{folder / f'{segment}.csv'} already exists, and recordings are not overwritten; "
             "give another folder"
         )
     of_can = not lsl and (log is None or log.suffix != ".csv")
@@ -315,7 +317,7 @@ def record(
 
 
 def _taken(samples: "Iterator[Sample]", raw: Path) -> "list[Sample]":
-    """Return what comes until there is no more, or somebody stops it."""
+    """Return the samples until they end, or until Ctrl-C."""
     found: list[Sample] = []
     try:
         for sample in samples:

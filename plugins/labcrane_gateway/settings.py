@@ -13,7 +13,7 @@ class GatewaySettings(Settings):
     """Name of the LSL stream with the commands."""
 
     flow: str = Field(default="gateway.flow", min_length=1)
-    """Name of the LSL stream in which the valves' flow is told."""
+    """Name of the LSL stream that sends the valves' flow."""
 
     timeout_s: PositiveFloat = 0.25
     """Age of the last command, in seconds, at which all valves shut and the station is lost."""

@@ -31,7 +31,7 @@ def set_up(settings: JoystickSettings, path: Path, say: Say, look: Look) -> None
     if not all(stick.has_socket for stick in sticks):
         say(
             "this computer does not name the sockets of its joysticks, so only their order tells "
-            "them apart: do this again whenever one was plugged in anew"
+            "left from right: repeat this whenever you plug one in again"
         )
     found = calibrate(pair(sticks, settings.stick), say, look, date.today().isoformat())
     save(path, settings.stick, found)
@@ -61,7 +61,7 @@ def main(
         settings = JoystickSettings(stick=stick)
     except ValidationError:
         raise typer.BadParameter(
-            f"{stick!r} is no model; write vendor:product, four hexadecimal digits each, "
+            f"{stick!r} is not a model; write vendor:product, four hexadecimal digits each, "
             f"like {JoystickSettings().stick}"
         ) from None
     try:

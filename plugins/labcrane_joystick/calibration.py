@@ -97,7 +97,7 @@ def load(path: Path, model: str) -> Calibrations | None:
     try:
         return Calibrations.model_validate(content[model])
     except ValidationError as error:
-        raise DeviceError(f"{path}: what it says of {model} {_why(error)}; {RUN_AGAIN}") from error
+        raise DeviceError(f"{path}: the entry {model} {_why(error)}; {RUN_AGAIN}") from error
 
 
 def save(path: Path, model: str, found: Calibrations) -> None:

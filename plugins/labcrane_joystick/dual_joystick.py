@@ -96,7 +96,7 @@ class DualJoystick(InputDevice):
         self._waiting = [stick for stick in self._waiting if stick.instance != gone]
         for side, stick in enumerate(self._sticks):
             if stick is not None and stick.instance == gone:
-                # Its axes would go on reading as zero, and nobody would know.
+                # Its axes would read as zero from now on, without any notice.
                 stick.joystick.quit()
                 self._sticks[side] = None
         self._state_fault()

@@ -25,7 +25,7 @@ OFF_CENTRE = 0.04
 """Share of full deflection at rest beyond which a dead zone of 5 % is about to be left."""
 
 STUCK = 0.5
-"""Share of full deflection at which nobody's stick rests."""
+"""Proportion of full deflection at which no working stick rests."""
 
 PUSHED = 0.6
 """Share of full deflection that counts as pushed."""
@@ -112,7 +112,7 @@ def _identity(sticks: tuple[Stick, Stick], stored: Calibrations | None) -> Findi
         return Finding(
             Verdict.WARN,
             "this computer does not name its sockets: only the order tells left from right",
-            f"{RUN_AGAIN} whenever a stick was plugged in anew",
+            f"{RUN_AGAIN} whenever you plug in a stick again",
         )
     return Finding(
         Verdict.PASS,

@@ -133,7 +133,7 @@ def pair(sticks: Sequence[Stick], model: str) -> list[Stick]:
 def model_of(guid: str) -> str:
     """Return vendor and product from SDL's GUID, which holds them as little-endian bytes.
 
-    The whole GUID is no identity: the same stick has another bus or checksum in it elsewhere.
+    The whole GUID does not identify a stick: its bus and checksum differ between computers.
     """
     vendor, product = guid[10:12] + guid[8:10], guid[18:20] + guid[16:18]
     return f"{vendor}:{product}"

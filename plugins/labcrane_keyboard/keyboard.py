@@ -108,7 +108,7 @@ class Keyboard(InputDevice):
         try:
             labels = numeric_labels(info)
         except StreamError as error:
-            raise StreamError(f"stream {self._stream!r} is no view's: {error}") from error
+            raise StreamError(f"stream {self._stream!r} is not from a view: {error}") from error
         sent = [label.removeprefix("key.") for label in labels if label.startswith("key.")]
         missing = [key for pair in self._settings.axes.values() for key in pair if key not in sent]
         if missing:

@@ -42,8 +42,8 @@ class Episode:
     success
         Whether it was, by an operator who was shown enough of it.
     presentation_failed
-        Whether the operator was shown less than the protocol asks for; that is no success, whatever
-        the outcome.
+        Whether less was presented to the operator than the protocol specifies; the attempt is then
+        not a success, whatever its outcome.
     skill
         Fraction of the operator's attempts in this recording that succeeded, of those of which
         enough was shown.
@@ -158,7 +158,7 @@ def ticks_of(session: SessionRecord, every: int) -> npt.NDArray[np.int64]:
 
 
 def _rows(session: SessionRecord, row: Mapping[Any, Any]) -> npt.NDArray[np.int64]:
-    """Return the ticks of an attempt that were no pause."""
+    """Return the ticks of an attempt outside pauses."""
     loop = session.streams["loop"]
     due = loop.time
     first, last = np.searchsorted(
@@ -181,7 +181,7 @@ def _read(session: SessionRecord, names: Names, rows: npt.NDArray[np.int64]) -> 
 
 
 ASIDE = {"outcome", "block_name", "group", "feedback"}
-"""Words of a trial's row that say nothing of what is to be done."""
+"""Columns of a trial's row that do not describe the task."""
 
 
 def _task(title: str, row: Mapping[Any, Any]) -> str:

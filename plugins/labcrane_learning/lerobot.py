@@ -125,7 +125,7 @@ class _Book:
         from pyarrow import parquet
 
         if self.layout is None or not self.episodes:
-            raise RecordingError("no trial was recorded that could be an episode")
+            raise RecordingError("no recorded trial can be an episode")
         meta = folder / "meta"
         (meta / "episodes" / "chunk-000").mkdir(parents=True)
         parquet.write_table(

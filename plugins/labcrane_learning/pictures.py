@@ -87,7 +87,7 @@ def _png(picture: Picture) -> bytes:
 
 
 class Histogram:
-    """Counts how often each value is in pictures, of which all that is asked of them follows."""
+    """Count how often each value occurs in pictures; all their statistics follow from that."""
 
     def __init__(self) -> None:
         self.counts = np.zeros((3, 256), np.int64)

@@ -67,7 +67,7 @@ class Robomimic(Exporter):
                         if episode.success:
                             succeeded.append(name)
             if not count:
-                raise RecordingError("no trial was recorded that could be an episode")
+                raise RecordingError("no recorded trial can be an episode")
             data.attrs["total"] = total
             file.create_dataset("mask/success", data=np.array(succeeded, "S"))
 

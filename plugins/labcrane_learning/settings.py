@@ -12,8 +12,8 @@ class EpisodeSettings(Settings):
     """Settings of :class:`~labcrane_learning.lerobot.LeRobot` and of robomimic's."""
 
     task: str = ""
-    """What the operator was to do, in a sentence; the study's title by default. The words of a
-    trial's condition stand behind it."""
+    """The operator's task, in a sentence; the study's title by default. The words of the trial's
+    condition follow it."""
 
     every: PositiveInt = 1
     """Every how many ticks there is a row; 8 makes 30 rows a second of 240."""

@@ -34,7 +34,7 @@ class Element:
     size
         Bytes of it, with its tag.
     pieces
-        Returns these bytes, one piece after another, anew at each call.
+        Returns these bytes in chunks, from the beginning at each call.
     """
 
     size: int

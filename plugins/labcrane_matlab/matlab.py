@@ -173,7 +173,7 @@ class Fields:
 
 
 def fields(names: Iterable[str]) -> list[str]:
-    """Return the fields of names that stand beside one another."""
+    """Return the field names for names in the same struct."""
     taken: list[str] = []
     for name in names:
         taken.append(_field(name, taken))

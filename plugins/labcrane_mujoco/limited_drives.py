@@ -10,8 +10,8 @@ ROUNDING = 1e-12
 """In rad/s: speeds this near are the same."""
 
 AT_LOWER, GIVES_ALL_UP, AT_SPEED, GIVES_ALL_DOWN, AT_UPPER = range(5)
-"""What a joint does, in the order of its speed: it stands at a stop, its drive gives all it has and
-is too slow, it has the speed asked for, or its drive gives all it has against a faster one."""
+"""What a joint does, in the order of its speed: it rests at a stop, its drive gives its maximum and
+is too slow, it has the requested speed, or its drive gives its maximum against a faster motion."""
 
 PASSES = 50
 """For every joint; a few for all of them are the rule."""
@@ -91,7 +91,7 @@ def limited_torques(
             torque[held] = np.linalg.solve(inverse[np.ix_(held, held)], gaps[held])
         speed = free + inverse @ torque
         shown = np.where(held, torque, speed)
-        # A torque beyond its bounds is told in the speed that it makes, as others are.
+        # A torque beyond its bounds is expressed as the speed that it causes, like the others.
         unit = np.where(held, stiff, 1.0)
         over = (shown - most[doing, every]) * unit
         under = (least[doing, every] - shown) * unit

@@ -39,7 +39,7 @@ class MujocoCrane(Crane):
         model.opt.timestep = 1.0 / run.rate_hz
         model.opt.gravity[:] = (0.0, 0.0, -GRAVITY)
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
-        # What the engine cannot compute must reach the loop, not begin anew with a warning.
+        # A failed computation must reach the loop; the engine must not reset with a warning.
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT  # nothing here has a shape
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_LIMIT

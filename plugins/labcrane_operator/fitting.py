@@ -138,8 +138,8 @@ def _duration(strokes: Strokes) -> dict[str, Estimate]:
     free = law.best(lowest_intercept=-np.inf)
     if free.values[0] >= 0.0:
         return free.estimates(free.values)
-    # An intercept below 0 is none that an operator can have. Intervals are those of the free fit:
-    # at a bound the curvature says nothing of the parameter that is held there.
+    # An operator cannot have an intercept below 0. The intervals are those of the free fit: at a
+    # bound, the curvature contains no information about the bounded parameter.
     return free.estimates(law.best(lowest_intercept=0.0, learning=free.learning).values)
 
 
@@ -162,7 +162,7 @@ class _Curve:
     def best(self, *, lowest_intercept: float, learning: bool | None = None) -> "_Fit":
         """Fit with and without learning, and return the better one, or the one that is asked for.
 
-        A learning curve that is no better than none cannot be told from chance.
+        A learning curve that does not fit better than none cannot be distinguished from chance.
         """
         slope, intercept = np.polyfit(self.bits, np.exp(self.logs), 1)
         start = [max(float(intercept), 0.01), max(float(slope), 0.01)]

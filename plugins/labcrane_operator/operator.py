@@ -15,7 +15,7 @@ RUNNING = Phase.RUNNING  # Python 3.11 takes long to find it there in every tick
 
 
 def _signals(settings: OperatorSettings) -> tuple[Signal, ...]:
-    """Return what it has: two joysticks, or the axes that it is told."""
+    """Return the operator's signals: two joysticks, or the axes in the settings."""
     if not settings.axes:
         return (Signal("left", "1", STICK), Signal("right", "1", STICK))
     button = (settings.button,) if settings.button else ()
@@ -71,7 +71,7 @@ class SimulatedOperator(InputDevice):
     def read(self, tick: Tick, seen: Frame) -> FloatArray:
         aimer, out = self._aimer, self._out
         out[:] = self._rest
-        if aimer is None or not self._sees(seen):  # what the last trial left is no target
+        if aimer is None or not self._sees(seen):  # values of the last trial are not a target
             return out
         task, state = seen.task.tolist(), seen.state.tolist()  # once: plain floats are cheaper
         x, y, z = task[self._target]

@@ -98,7 +98,7 @@ class OperatorSettings(Settings):
     def _have_no_sign(cls, axes: tuple[str, ...]) -> tuple[str, ...]:
         if turned := [axis for axis in axes if axis.startswith("-")]:
             raise ValueError(
-                f"{turned[0]!r} is turned round, which only a scheme's map says; write "
+                f"{turned[0]!r} is reversed, but only a scheme's map can reverse an axis; write "
                 f"{turned[0][1:]}"
             )
         return axes
@@ -107,7 +107,7 @@ class OperatorSettings(Settings):
     def _button_is_beside_axes(self) -> "OperatorSettings":
         if self.button is not None and not self.axes:
             raise WrongKey(
-                "button is there without axes, and two joysticks have their triggers; name axes "
+                "button is given without axes, and two joysticks have their triggers; name axes "
                 "as well, or leave button out",
                 at=("button",),
             )

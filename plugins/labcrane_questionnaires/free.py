@@ -21,7 +21,7 @@ class Free(Questionnaire):
                 sum(self._items[name].lowest for name in names if name in self._items),
                 sum(self._items[name].highest for name in names if name in self._items),
             )
-            for score, names in settings.sums.items()  # a name of nothing is told by the check
+            for score, names in settings.sums.items()  # the check reports unknown names
         )
 
     def items(self) -> Sequence[Item]:

@@ -8,7 +8,7 @@ from labcrane_questionnaires.lab_scale import LabScale
 from labcrane_questionnaires.settings import LabText
 
 BEYOND = 20.0
-"""Largest rating on CR10 that is taken; twice the strongest that somebody knew before."""
+"""Largest rating on CR10 that is accepted: twice the strongest experience so far."""
 
 
 class _Slot(LabScale):

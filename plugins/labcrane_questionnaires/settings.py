@@ -72,7 +72,7 @@ class DemographicsSettings(RatingSettings):
     @classmethod
     def _each_is_one(cls, ask: tuple[Asked, ...]) -> tuple[Asked, ...]:
         if twice := _twice(ask):
-            raise ValueError(f"{twice[0]!r} is there twice; write each once")
+            raise ValueError(f"{twice[0]!r} is listed twice; write each once")
         return ask
 
 
@@ -281,7 +281,7 @@ class QuestionSettings(Settings):
     @classmethod
     def _each_is_another(cls, choices: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         if (twice := _twice(choices)) and not was_run(info):
-            raise ValueError(f"{twice[0]!r} is there twice; write each once")
+            raise ValueError(f"{twice[0]!r} is listed twice; write each once")
         return choices
 
     @model_validator(mode="after")
@@ -304,13 +304,16 @@ class QuestionSettings(Settings):
                 at=("highest" if "highest" in self.model_fields_set else "lowest",),
             )
         if self.words and self.kind != "scale":
-            raise WrongKey(f"question {self.name!r} is no scale and has words", at=("words",))
+            raise WrongKey(
+                f"question {self.name!r} has words, but is not a scale; leave them out",
+                at=("words",),
+            )
         if wrong := unstepped(self.words, self.lowest, self.highest, self.step):
             raise WrongKey(f"question {self.name!r} {wrong}", at=("words",))
         return self
 
     def doubt(self) -> str:
-        """Return what hardly anybody means by it; nothing mostly."""
+        """Return why the settings are probably a mistake; empty if they are not."""
         if self.kind == "choice" and len(self.choices) == 1:
             return "has one choice"
         if self.kind not in {"scale", "number"}:

@@ -19,9 +19,9 @@ WORST = 3.0
 class Ssq(LabScale):
     """Sixteen symptoms from 0 (none) to 3 (severe).
 
-    A subscale is the sum of its seven items times its weight, the total the three sums times 3.74.
-    A missing answer makes every score that needs it NaN. A score before the session is needed as
-    well: nobody's baseline is zero.
+    A subscale is the sum of its seven items times its weight; the total is the three sums times
+    3.74. A missing answer makes every score that needs it NaN. Ask the questionnaire before the
+    session, too, because baselines are not zero.
     """
 
     usual_title = "Simulator sickness questionnaire"

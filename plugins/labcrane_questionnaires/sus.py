@@ -29,10 +29,10 @@ NAMES = tuple(f"statement_{number}" for number in range(1, len(STATEMENTS) + 1))
 
 
 class Sus(Questionnaire):
-    """Ten statements from 1 to 5; the score goes from 0 to 100 and is no percentage.
+    """Ten statements from 1 to 5; the score goes from 0 to 100 and is not a percentage.
 
-    Odd statements count their rating less 1, even ones 5 less their rating, the sum is taken 2.5
-    times. A missing answer makes the score NaN.
+    Odd statements contribute their rating minus 1, even statements 5 minus their rating. The score
+    is the sum times 2.5. A missing answer makes the score NaN.
     """
 
     scores = (Score("total", 0.0, 100.0),)

@@ -10,13 +10,13 @@ from labcrane_scenario.mistakes import ContactEpisode, Mistakes
 from labcrane_scenario.settings import ScenarioSettings
 
 SETTLE_S = 0.5
-"""Somebody is placed a little above the ground, and lies when this time has passed, in seconds."""
+"""Time in seconds in which a casualty, placed a little above the ground, settles on it."""
 
 SUPPORTED_M = 0.02
-"""What slipped and fell by no more than this was set down or stood on something, in metres."""
+"""Something that slipped and fell by no more than this, in metres, was set down or supported."""
 
 GRIP = ("height", "loose", "slipped", "left")
-"""What the state says of a thing that leaves the jaws."""
+"""Entries of the state about a thing that leaves the jaws."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +177,7 @@ class Observation:
 def _grounds(
     settings: ScenarioSettings, run: Run, thing: PlacedObject, hold: int
 ) -> Iterator[Watched]:
-    """Yield what watches how hard each part of somebody lands, where the state says so."""
+    """Yield an observer of each part of a casualty that measures how hard it lands."""
     signal = f"scene.{thing.name}.ground"
     if not any(each.name == signal for each in run.state.signals):
         return

@@ -70,7 +70,7 @@ class Scenario(Task):
         Signal(
             "k",
             "1",
-            definition="1 where all goals were reached, else 0; the supervisor's completion "
+            definition="1 if all goals were reached, else 0; the experimenter's completion "
             "overrides it",
         ),
     )

@@ -18,13 +18,13 @@ class ScenarioSettings(Settings):
     """Settings of the scenario task."""
 
     scenes: tuple[SceneFile, ...] = Field(min_length=1)
-    """Scene files, one run each; a scene's name is its file's. They are the levels of the factor
-    ``scenes``."""
+    """Scene files, one run each; a scene has the name of its file. The scenes are the levels of the
+    factor ``scenes``."""
 
     mistakes: PositiveInt = 4
-    """More mistakes than this of one kind end the run, with a completion flag of 0, unless the
-    supervisor overrides it. Drops are counted beside them and end nothing: the paper's indicator
-    has none."""
+    """More mistakes than this of one kind end the run with a completion flag of 0, unless the
+    experimenter overrides it. Drops are counted separately and do not end the run: the paper's
+    indicator does not include them."""
 
     limit_s: Annotated[PositiveFloat | None, Usual(5.0, 4 * 3600.0)] = None
     """Time after which a run ends, in seconds; each scene's own by default."""
@@ -36,19 +36,19 @@ class ScenarioSettings(Settings):
     """... for this time, in seconds. Until then it is one mistake."""
 
     drop_m: Annotated[NonNegativeFloat, Usual(0.001, 5.0)] = 0.15
-    """Something that is let go and falls by more than this is a drop, once it has left the jaws, in
-    metres; what slips out of them is one where nothing supports it. Of somebody it is the limb in
-    the jaws that counts."""
+    """Height in metres above which something that is let go counts as dropped, once it has left the
+    jaws. Something that slips out of the jaws is a drop if nothing supports it. For a casualty, the
+    limb in the jaws counts."""
 
     find_axis: ButtonName | None = None
     """Button with which the operator reports a deformity, while the tip is near it; none by
-    default. It counts when it is pressed, not while it is held. Both pages have a button too; the
-    participant's counts like this one, and the supervisor's, or a note that begins with "found",
-    wherever the tip is. Where there is no deformity, or the tip is not near it, a report is false
-    and counted as such."""
+    default. It counts when it is pressed, not while it is held. Both pages have a button, too. The
+    participant's counts like this one. The experimenter's, or a note that begins with "found",
+    counts wherever the tip is. If there is no deformity, or the tip is not near it, the report is
+    false and counted as such."""
 
     find_m: PositiveFloat = 0.5
-    """How near the tip must be then to the middle of the limb, in metres."""
+    """Distance in metres from the middle of the limb within which the tip must be for a report."""
 
     def provides(self, machine: Machine) -> Names:
         from labcrane.machines import load_scene  # noqa: PLC0415 - loads numpy

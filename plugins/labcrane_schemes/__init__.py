@@ -1,4 +1,4 @@
-"""Control schemes: what the operator's axes ask of the joints."""
+"""Control schemes: how the operator's axes command the joints."""
 
 from collections.abc import Sequence
 

@@ -11,7 +11,7 @@ from labcrane.machines import Arm, reach
 from labcrane_schemes.resolved_rate import ResolvedRate
 
 POSES = 64
-"""How many poses stand for a study without targets."""
+"""Number of poses that represent a study without targets."""
 
 DIRECTIONS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 """Along the arm, across it, and up."""
@@ -55,7 +55,7 @@ def attainable(
 def _poses(machine: Machine, places: Sequence[Sphere]) -> Sequence[Sequence[float]]:
     centres = dict.fromkeys(place.centre for place in places)
     found = [pose for centre in centres if (pose := reach(machine, centre)) is not None]
-    spread = random.Random(0)  # noqa: S311 - which poses is no secret
+    spread = random.Random(0)  # noqa: S311 - the poses are not secret
     return found or [
         [spread.uniform(lowest, highest) for lowest, highest in machine.limits]
         for _ in range(POSES)

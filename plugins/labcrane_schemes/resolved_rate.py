@@ -138,7 +138,7 @@ class ResolvedRate:
             rz += r * z
             zz += z * z
         threshold2 = self._threshold2
-        # Whether an eigenvalue is below the threshold is told without a root; mostly none is.
+        # This test for an eigenvalue below the threshold needs no square root; it rarely holds.
         if rr < threshold2 or (rr - threshold2) * (zz - threshold2) <= rz * rz:
             damp = self._damp(_smallest(rr, rz, zz))
             rr += damp

@@ -57,7 +57,7 @@ class Switchable(Controller):
     def begin_trial(self, trial: Trial) -> None:
         self._active = self._start
         self._share = float(self._start)
-        self._down = True  # a button still held from the last trial is no new press
+        self._down = True  # a button held since the last trial is not a new press
 
     def command(self, axes: FloatArray, state: FloatArray) -> FloatArray:
         down = self._sign * axes.item(self._index) > PRESSED

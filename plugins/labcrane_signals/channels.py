@@ -1,4 +1,4 @@
-"""Channels by what they measure: units as factors, and which channels are no signal at all."""
+"""Channels by what they measure: units as factors, and which channels are not signals."""
 
 from collections.abc import Sequence
 
@@ -37,7 +37,7 @@ NO_SIGNAL = (
     "sequence",
     "button",
 )
-"""Words in the label or type of a channel that is no signal: it may stand still or jump."""
+"""Words in the label or type of a channel that is not a signal: it may be constant or jump."""
 
 
 def word(text: str) -> str:

@@ -20,7 +20,7 @@ from labcrane_signals.windows import BoolArray, Streak, WindowedMonitor
 
 MAINS_HZ = (50, 60)
 HUM_RATIO = 10.0
-"""How far the power at the mains frequency must stand above that beside it."""
+"""Minimum ratio of the power at the mains frequency to that at neighbouring frequencies."""
 
 BAND_HZ = (1.0, 40.0)
 NOISE_HZ = (20.0, 45.0)
@@ -36,7 +36,7 @@ WINDOWS = {
     "disconnected electrode": 6,
     "bridged electrode": 6,
 }
-"""How many windows of half a second a fault must last until it is told."""
+"""Number of half-second windows that a fault must last before it is reported."""
 
 ADVICE = {
     "no values": "sends no numbers: look at the amplifier's program",
@@ -168,7 +168,7 @@ class ElectrodeMonitor(WindowedMonitor):
         return faults
 
     def _message(self, kind: str, channel: int, seen: dict[str, object]) -> str:
-        """Return what is said of a channel; a fault may be told for longer than it is measured."""
+        """Return the message about a channel; a report may outlast the measured fault."""
         figures: dict[str, Any] = {"hum": 0.0, "mains": 0, "noise": 0.0, "other": -1}
         for name, value in seen.items():
             figures[name] = value[channel] if isinstance(value, np.ndarray) else value

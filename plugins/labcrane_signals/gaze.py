@@ -28,7 +28,7 @@ PUPIL_MM = (1.2, 9.5)
 Vision 12(10), 12)."""
 
 PUPIL_UNIT_MM = (0.05, 40.0)
-"""Beyond, it is no pupil in this unit at all."""
+"""Range of pupil diameters; a value outside means that the unit is wrong."""
 
 JUMP_MM = 1.0
 """No pupil changes by so much from one sample to the next; a blink's edge does now and then."""

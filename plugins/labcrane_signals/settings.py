@@ -15,7 +15,7 @@ class ElectrodeSettings(Settings):
     """Frequency of the mains where the study runs, in Hz; none looks for both."""
 
     hum_uv: PositiveFloat = 10.0
-    """Mains hum from which on it is told, in microvolts, root mean square."""
+    """Mains hum from which it is reported, in microvolts, root mean square."""
 
 
 class EegSettings(ElectrodeSettings):
@@ -29,14 +29,14 @@ class EcgSettings(ElectrodeSettings):
     """Whether an ECG is alive: flat, railing, hum, disconnected."""
 
     hum_uv: PositiveFloat = 50.0
-    """Mains hum from which on it is told, in microvolts, root mean square."""
+    """Mains hum from which it is reported, in microvolts, root mean square."""
 
 
 class EmgSettings(ElectrodeSettings):
     """Whether an EMG is alive: flat, railing, hum."""
 
     hum_uv: PositiveFloat = 20.0
-    """Mains hum from which on it is told, in microvolts, root mean square."""
+    """Mains hum from which it is reported, in microvolts, root mean square."""
 
 
 class GazeSettings(Settings):

@@ -26,8 +26,8 @@ ADVICE = {
 class StickMonitor(WindowedMonitor):
     """Tells sticks that have died away from rest, and a wrong unit.
 
-    One that stands exactly at rest may be let go of: that is no fault, unless its rest was seen to
-    tremble before.
+    A stick exactly at rest may have been let go. This is not a fault, unless it trembled at rest
+    before.
     """
 
     def __init__(self, settings: StickSettings) -> None:

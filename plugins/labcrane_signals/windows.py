@@ -12,7 +12,7 @@ from labcrane_signals.channels import labels
 
 WIDTH_S = 1.0
 HOP_S = 0.5
-"""A window is judged so often: a fault that holds for six of them is told within 4.5 s."""
+"""Interval between windows: a fault that lasts for six of them is reported within 4.5 s."""
 
 BoolArray = npt.NDArray[np.bool_]
 

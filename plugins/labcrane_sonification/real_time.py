@@ -1,8 +1,9 @@
 """Real-time scheduling of the thread that changes a sound.
 
-pyo computes a block with Python's global lock held. Where JACK gives pyo's thread a real-time
-priority, that thread still waits for whoever has the lock; on a busy computer an ordinary thread
-with the lock waits for all other programs first. So the thread that gives the changes follows.
+pyo computes a block while it holds Python's global lock. Even if JACK gives pyo's thread a
+real-time priority, that thread waits for the thread that has the lock. On a busy computer, an
+ordinary thread with the lock waits for all other programs first. So the thread that sends the
+changes gets a real-time priority, too.
 """
 
 import os
@@ -11,11 +12,11 @@ import threading
 from pathlib import Path
 
 PRIORITY = 1
-"""Above all ordinary programs, and below JACK, which has 5 unless it was told otherwise."""
+"""Above all ordinary programs, and below JACK, whose default is 5."""
 
 
 def follow() -> str:
-    """Give the calling thread a real-time priority if another one has it; say what it has now.
+    """Give the calling thread a real-time priority if another one has it; return the new one.
 
     Threads and processes that it starts later keep an ordinary one.
     """

@@ -127,7 +127,7 @@ class Synth:
             self._set(side, gain)
 
     def at_every_block(self, begun: Callable[[float], None]) -> None:
-        """Let ``begun`` be told the time, in seconds, whenever the server begins a block."""
+        """Call ``begun`` with the time, in seconds, whenever the server begins a block."""
         self.server.setCallback(lambda: begun(time.perf_counter()))
 
     def ramp(self, seconds: float) -> None:

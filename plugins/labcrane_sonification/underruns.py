@@ -1,7 +1,7 @@
 """Underruns: blocks that a sound server was not given in time, counted."""
 
 WINDOW = 64
-"""Blocks after which the server's clock is looked at anew: it drifts, and it starts again."""
+"""Number of blocks after which the server's clock is read again, because it drifts and restarts."""
 
 
 class Underruns:
@@ -30,9 +30,9 @@ class Underruns:
         self._left = WINDOW
 
     def begun(self, now: float) -> None:
-        """Be told that the next block is begun, ``now`` in seconds on any clock."""
-        # Nobody is told when a block was asked for, but none is begun earlier: the earliest ones
-        # show when they are due.
+        """Note that the next block begins at ``now``, in seconds on any clock."""
+        # The time of a block's request is unknown, but no block begins before it: the earliest
+        # blocks show when they are due.
         late = now - self._due
         if late < 0.0 or self._due == float("inf"):
             self._due, late = now, 0.0

@@ -18,7 +18,7 @@ from labcrane_tables.tables import write_csv
 
 CHECKSUMS = "manifest-sha256.txt"
 MOST = 10
-"""Findings that are told at once."""
+"""Number of findings in one message."""
 
 HOST = re.compile(rb"(<hostname>)([^<]*)(</hostname>)")
 
@@ -122,9 +122,9 @@ class Archive(Exporter):
 
 
 def _hide_computers(path: Path) -> None:
-    """Take the names of computers out of what LSL says of each stream: they are people's, often.
+    """Remove the names of computers from LSL's stream headers: they are often people's names.
 
-    As many signs stay as there were, so that nothing is left in the file of what was replaced.
+    The number of characters stays the same, so that no remains of the old text stay in the file.
     """
     import h5py
     import numpy as np

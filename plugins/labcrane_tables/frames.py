@@ -70,10 +70,10 @@ def stream_tables(session: SessionRecord) -> Iterator[StreamTable]:
 
 
 class Names:
-    """What columns are called in an export: lower-case words with underscores, all different.
+    """Names of columns in an export: lower-case words with underscores, all different.
 
-    A column keeps the name that it was given first, whichever others somebody's table has. So
-    ``movement.time`` of a questionnaire is ``movement_time_2`` for everyone, beside the measure.
+    A column keeps its first name, whichever other columns a participant's table has. So
+    ``movement.time`` of a questionnaire is ``movement_time_2`` for everyone, next to the measure.
     """
 
     def __init__(self) -> None:

@@ -24,7 +24,7 @@ AT_ONCE = 4096
 """Bytes that are taken off the port at once."""
 
 FLOOD, REST_S = 64, 0.005
-"""So many bytes at once are no echoes: then the listener rests, and the loop has its time."""
+"""So many bytes at once are not echoes: the listener then rests, so that the loop can run."""
 
 KEPT = 1024
 """Echoes that wait for a tick; of a flood the newest stay."""

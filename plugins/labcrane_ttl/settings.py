@@ -1,4 +1,4 @@
-"""Settings of lines by which other devices are told of events."""
+"""Settings of the lines that signal events to other devices."""
 
 from collections.abc import Mapping
 from pathlib import Path

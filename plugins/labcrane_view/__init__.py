@@ -1,4 +1,4 @@
-"""The crane in a forest, in 3-D: windows for the operator, the examiner and the mirror."""
+"""The crane in a forest, in 3-D: windows for the operator, the experimenter and the mirror."""
 
 from collections.abc import Sequence
 

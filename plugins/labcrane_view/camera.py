@@ -85,7 +85,8 @@ class Camera:
     def __init__(self, settings: CameraSettings, machine: Machine) -> None:
         if settings.on is not None and settings.on not in machine.names:
             raise ProtocolError(
-                f"camera {settings.name!r} rides on {settings.on!r}, which the machine has not; "
+                f"camera {settings.name!r} is attached to {settings.on!r}, which this machine does "
+                "not have; "
                 f"it has {', '.join(machine.names)}"
             )
         self.settings = settings

@@ -30,7 +30,7 @@ def examine(settings: ViewSettings, ask: Prompt | None) -> list[Finding]:
 
 
 def _monitors() -> list[Finding]:
-    """Return what is to be said of each monitor's refresh rate."""
+    """Return the findings about each monitor's refresh rate."""
     try:
         rates = refresh_rates()
     except DeviceError:
@@ -40,7 +40,7 @@ def _monitors() -> list[Finding]:
 
 
 def _swap(refresh: Refresh) -> Finding:
-    """Return what is to be said of how pictures get onto the glass."""
+    """Return the finding about the display of pictures: buffers and tearing."""
     text = f"tearing is {refresh.tearing}"
     if refresh.buffers > 1 and refresh.waits is not False:
         return Finding(Verdict.PASS, text)

@@ -22,7 +22,7 @@ GREY = (0.5, 0.5, 0.5, 1.0)
 BLACK, LIGHT = (0.0, 0.0, 0.0, 1.0), GREY
 
 SIDES = 64
-"""Of the polygon that stands for a circle."""
+"""Number of sides of the polygon that approximates a circle."""
 
 ORDER = 45
 """Over the text and the state's curtain, below markers and the photodiode's patch."""

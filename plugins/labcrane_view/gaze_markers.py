@@ -1,7 +1,7 @@
 """Gaze markers: squares in a picture's corners by which a head-mounted eye tracker finds it.
 
-A head-mounted tracker knows where in its own camera's picture somebody looks. It finds the screen
-there by printed or shown AprilTags, whose corners say where the screen is.
+A head-mounted tracker measures where the wearer looks in the picture of its own camera. It finds
+the screen in that picture by AprilTags, printed or shown, whose corners give its position.
 """
 
 from collections.abc import Iterator, Sequence
@@ -164,7 +164,7 @@ def _card(root: Any, box: tuple[int, int, int, int], *, white: bool, order: int)
 
 
 def described(markers: Sequence[GazeMarker]) -> str:
-    """Return what the record says of markers: number, and left top right bottom of its frame."""
+    """Return the markers for the record: number, and left top right bottom of each frame."""
     corners = "; ".join(
         f"{marker.code} at {' '.join(str(edge) for edge in marker.frame)}" for marker in markers
     )

@@ -9,7 +9,7 @@ from labcrane.core import SessionState, TargetFinder
 
 LOAD = "joint.load"
 PEOPLE = {"examiner", "stop rule"}
-"""Whoever else holds a session is a part that is lost."""
+"""Who can pause a session; any other name is that of a lost component."""
 
 ITEM = re.compile(r"([-*+•]|\d+[.)])\s")
 
@@ -114,10 +114,9 @@ def notice(frame: Frame, situation: SessionState, hint_s: float, language: str) 
 
 
 def standing(frame: Frame, situation: SessionState) -> str:
-    """Return why nobody is to move, as the word's name in ``WORDS``; empty while somebody may.
+    """Return why the operator must not move, as a name in ``WORDS``; empty while they may.
 
-    What is to be read stays legible: nothing covers the picture only because the session waits for
-    its reader.
+    Text stays legible: nothing covers the picture only because the session waits for its reader.
     """
     if situation.over:
         return "done"
@@ -128,9 +127,9 @@ def standing(frame: Frame, situation: SessionState) -> str:
 
 
 def unwrapped(text: str) -> str:
-    """Return text whose lines may be broken anew: a file breaks them where its author's screen did.
+    """Return text without the line breaks of its file, so that the view can wrap it.
 
-    Paragraphs stay apart, and items of a list have lines of their own.
+    Paragraphs and the items of a list stay separate.
     """
     kept: list[str] = []
     for line in map(str.strip, text.strip().splitlines()):

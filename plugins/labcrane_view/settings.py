@@ -39,13 +39,13 @@ Triple = tuple[float, float, float]
 
 
 class CameraSettings(Settings):
-    """Where a camera stands, or what it rides on."""
+    """Where a camera is, or the joint that it is attached to."""
 
     name: str = "camera"
     """Names it in the picture and in the areas of interest."""
 
     eye: Annotated[Triple, Unit("m")]
-    """Where it is, in metres, in the machine's base frame or in that of the joint it rides on."""
+    """Position in metres, in the machine's base frame or in that of the joint it is attached to."""
 
     look: Annotated[Triple, Unit("m")] | Literal["targets"]
     """A point in the middle of its picture, in the same frame. ``targets`` turns it once, for the
@@ -81,7 +81,7 @@ class CameraSettings(Settings):
             raise WrongKey("look is where its eye is; write a point that it looks at", at=("look",))
         if self.look == "targets" and self.on is not None:
             raise WrongKey(
-                f"a camera that rides on {self.on!r} cannot hold the targets in its picture; write "
+                f"a camera attached to {self.on!r} cannot keep the targets in its picture; write "
                 "look: as a point",
                 at=("look",),
             )
@@ -128,7 +128,7 @@ FEWEST_ARCMIN, MOST_ARCMIN = 5.0, 180.0
 FONTS = (".ttf", ".otf", ".ttc", ".pfb", ".pfa", ".woff", ".fon")
 
 OTHER_FONTS = (b"ttcf", b"wOFF", b"\x80\x01", b"%!", b"MZ")
-"""What is at the beginning of fonts that are no TrueType and no OpenType of their own."""
+"""First bytes of font files other than plain TrueType and OpenType."""
 
 
 def _is_file(path: Path) -> bool:
@@ -136,12 +136,12 @@ def _is_file(path: Path) -> bool:
 
 
 def _no_font(path: Path) -> str:
-    """Return why a file is no font; nothing where it looks like one."""
+    """Return why a file is not a font; empty if it looks like one."""
     raw = path.read_bytes()
     if raw.startswith(OTHER_FONTS):
         return ""
     if raw[:4] not in {b"\0\1\0\0", b"true", b"OTTO"}:
-        return "is no font"
+        return "is not a font"
     count = int.from_bytes(raw[4:6], "big")
     records = [raw[at : at + 16] for at in range(12, 12 + 16 * count, 16)]
     ends = [
@@ -187,7 +187,7 @@ class GazeMarkerSettings(Settings):
 
 
 class SupervisorSettings(Settings):
-    """Which pictures the supervisor's page shows."""
+    """The pictures that the experimenter's page shows."""
 
     cameras: Annotated[tuple[CameraName, ...], Once()] = ()
     """Names of the cameras; all by default."""
@@ -196,34 +196,34 @@ class SupervisorSettings(Settings):
     """Pictures per second of the session's time."""
 
     width: Pixels = 480
-    """Largest width of a picture, in pixels; of a wider one only every second, third, ... pixel is
-    sent."""
+    """Maximum width of a picture, in pixels. From a wider picture, only every second, third, ...
+    pixel is sent."""
 
 
 DepthCue = Literal["tip_shadow", "plumb_line", "ground_grid"]
 
 HudLine = Literal["block", "trial", "distance", "time", "speed", "load", "lateness"]
-"""What a line of text can say."""
+"""What a line of text can show."""
 
 
 MOST_PIXELS = 16_384
-"""Of a picture's edge; more is no screen, and graphics cards refuse it."""
+"""Maximum of a picture's edge in pixels: no screen is larger, and graphics cards refuse more."""
 
 Screen = NonNegativeInt | Annotated[str, Field(min_length=1)]
 """A monitor: its number, counted from 0, or its name."""
 
 
 class ViewSettings(Settings):
-    """A window, what is seen in it, and from where."""
+    """A window: its content, its cameras and its place."""
 
     camera: Camera = CAMERAS["cab_left"]
-    """``cab_left``, ``cab_right``, ``free``, ``top``, or a camera written out."""
+    """``cab_left``, ``cab_right``, ``free``, ``top``, or the settings of a camera."""
 
     beside: tuple[Camera, ...] = ()
     """Further cameras, side by side with the first in the same window."""
 
     size: tuple[Pixels, Pixels] = (1280, 720)
-    """Width and height, in pixels; a full screen has its own."""
+    """Width and height, in pixels; not used on a full screen."""
 
     screen: Screen | None = None
     """The monitor to fill: its name (``HDMI-1``), or its number, counted from 0; a window by
@@ -233,27 +233,28 @@ class ViewSettings(Settings):
     """Monitors to fill with one wide picture, from left to right, instead of ``screen``."""
 
     bezel_mm: Annotated[NonNegativeFloat, Usual(0.1, 300.0)] = 0.0
-    """What lies between the pictures of two of ``screens``, in millimetres: as much of the wide
-    picture is behind their frames, so that what moves across goes on straight."""
+    """Distance between the pictures of two neighbouring ``screens``, in millimetres. This part of
+    the wide picture is hidden, so that movements across the gap stay straight."""
 
     screen_mm: Annotated[PositiveFloat | None, Usual(50.0, 10_000.0)] = None
-    """Width of one monitor's visible picture, in millimetres; as the monitor says by default."""
+    """Width of one monitor's visible picture, in millimetres; the monitor's value by default."""
 
     flip: Literal["none", "horizontal", "vertical"] = "none"
-    """Turns the picture over, for a mirror."""
+    """Flips the picture, for a mirror."""
 
     content: Literal["scene", "feedback"] = "scene"
     """``feedback`` shows targets and cues on black: for a semi-transparent mirror on a table."""
 
     seen_by: Literal["operator", "examiner"] = "operator"
-    """Who looks at it. What tells the operator how far the task's goal is belongs to the design."""
+    """Who sees the view. If it shows the operator the distance to the goal, that is feedback, and
+    belongs to the design."""
 
     hud: Annotated[tuple[HudLine, ...], Once()] | None = None
-    """Lines of text in the corner; block and trial by default, and for the examiner the distance to
-    the target as well. ``load`` is how hard each joint works, if the machine says."""
+    """Lines of text in the corner; block and trial by default; for the experimenter the distance to
+    the target as well. ``load`` is the load of each joint, if the machine reports it."""
 
     notices: bool = True
-    """Whether the operator is shown what is to be read: instructions, questions, hints."""
+    """Whether the view shows texts to the operator: instructions, questions, hints."""
 
     hint_s: PositiveFloat = 8.0
     """How long a hint is shown, in seconds."""
@@ -288,14 +289,14 @@ class ViewSettings(Settings):
     """How long ago what is shown happened: a teleoperator's delay, in seconds."""
 
     rate_hz: Annotated[PositiveFloat | None, Usual(1.0, 500.0)] = None
-    """Most pictures per second; as many as the monitor shows by default."""
+    """Maximum of pictures per second; the monitor's refresh rate by default."""
 
     keys: Annotated[tuple[Key, ...], Once()] = ()
     """Keys whose state is sent while the window has the focus, for the input ``keyboard``: letters,
     digits, ``arrow_left``, ``space``, ``lshift`` ..."""
 
     supervisor: SupervisorSettings | None = None
-    """Sends what cameras show to the supervisor's page; ``{}`` for all of them, none by default."""
+    """Sends the cameras' pictures to the experimenter's page: ``{}`` for all, none by default."""
 
     patch: PatchSettings | None = None
     """Square for a photodiode; none by default."""
@@ -326,13 +327,13 @@ class ViewSettings(Settings):
     @classmethod
     def _is_a_font(cls, font: Path | None, info: ValidationInfo) -> Path | None:
         if font is not None and font.suffix.lower() not in FONTS and not was_run(info):
-            raise ValueError(f"{font.name!r} is no font file; give one, as .ttf or .otf")
+            raise ValueError(f"{font.name!r} is not a font file; give one, as .ttf or .otf")
         return font
 
     @model_validator(mode="after")
     def _screens_and_text_fit(self) -> "ViewSettings":
         if self.screens and self.screen is not None:
-            raise WrongKey("screen and screens are both there; write one of them", at=("screen",))
+            raise WrongKey("screen and screens cannot be combined; drop one", at=("screen",))
         if self.screens and self.beside:
             raise WrongKey(
                 "screens shows one wide picture, and beside asks for several; leave one out",
@@ -386,7 +387,7 @@ class ViewSettings(Settings):
         if twice := [name for at, name in enumerate(names) if name in names[:at]]:
             found["beside"] = (
                 f"has a second camera called {twice[0]!r}, so that their areas of interest and "
-                "their pictures for the supervisor have one name"
+                "their pictures on the experimenter's page would share a name"
             )
         if max(self.size) > MOST_PIXELS:
             found["size"] = f"is {self.size[0]} by {self.size[1]} pixels, more than any screen has"
@@ -406,7 +407,7 @@ class ViewSettings(Settings):
         if self.text_arcmin is not None and not FEWEST_ARCMIN <= self.text_arcmin <= MOST_ARCMIN:
             found["text_arcmin"] = f"is {self.text_arcmin:g} minutes of arc, and 16 to 22 are usual"
         if self.hint_s < SHORTEST_HINT_S:
-            found["hint_s"] = f"is {self.hint_s:g} s, in which nobody reads a hint"
+            found["hint_s"] = f"is {self.hint_s:g} s, too short to read a hint"
         return found
 
     def _told_to_everybody(self) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Pictures of a view's cameras for the supervisor's page."""
+"""Pictures of a view's cameras for the experimenter's page."""
 
 import math
 from collections.abc import Sequence

@@ -251,9 +251,9 @@ def test_numbers_of_a_mesh_are_in_the_approval_as_its_addresses_say(tmp_path: Pa
 @pytest.mark.parametrize(
     ("section", "key", "said"),
     [
-        ("scheme: {use: valve, model: other.yaml}", "model", "is no model: "),
-        ("scheme: {use: valve, model: words.md}", "model", "is no model: "),
-        ("dynamics: {use: dmd_arm, model: other.yaml}", "model", "is no model: it has no segments"),
+        ("scheme: {use: valve, model: other.yaml}", "model", "is not a model: "),
+        ("scheme: {use: valve, model: words.md}", "model", "is not a model: "),
+        ("dynamics: {use: dmd_arm, model: other.yaml}", "model", "not a model: it has no segments"),
         ("operator: {use: recorded, file: nothing.h5}", "file", "nothing.h5"),
         ("operator: {use: recorded, file: words.md}", "file", "words.md"),
         ("input: {use: recorded, file: nothing.h5}", "file", "nothing.h5"),

@@ -197,7 +197,7 @@ UNLIKE = [
         ([("sessions:", "streams: {a: {name: A, type: eeg}}\nsessions:")], "streams.a.type", "letter by letter, and devices write 'EEG'"),
         ([("sessions:", "streams: {a: {name: A, type: mocap}}\nsessions:")], "streams.a.type", "devices write 'MoCap'"),
         ([("sessions:", "streams: {a: {name: ''}}\nsessions:")], "streams.a", "by an empty text"),
-        ([("sessions:", "views: {front: {use: view, hint_s: 1 ms}}\nsessions:")], "views.front.hint_s", "nobody reads"),
+        ([("sessions:", "views: {front: {use: view, hint_s: 1 ms}}\nsessions:")], "views.front.hint_s", "too short to read"),
         ([("sessions:", "views: {front: {use: view, patch: {size: 5000}}}\nsessions:")], "views.front.patch.size", "is 5000 pixels, and 720"),
         ([("{use: kinematic_crane}", "{use: kinematic_crane, actuator: {lag_s: 50}}")], "dynamics.actuator", "follows 50 s late"),
         ([("{use: kinematic_crane}", "{use: bullet_crane, payload_kg: 99 t}")], "dynamics.payload_kg", "is 99000 kg; with it"),

@@ -86,7 +86,7 @@ def told(tmp_path: Path, registry: Registry):
         ("aiming", "width: 0.5", "width: 50", "20:57: tasks.aiming.width: a circle 50 m wide holds the middle of its partner 2 m away; write less than 2"),
         ("aiming", "width: 0.5", "width: 1e300", "20:57: tasks.aiming.width: a circle 1e+300 m wide"),
         ("aiming", "width: 0.5", "width: 2", "20:57: tasks.aiming.width: a circle 2 m wide"),
-        ("aiming", "[2, 3, 4, 6]", "[1,5, 2,5, 4]", "20:36: tasks.aiming.distances: 5 m is there twice; write each distance once, and decimals with a point: [1.5, 2.5, 4]"),
+        ("aiming", "[2, 3, 4, 6]", "[1,5, 2,5, 4]", "20:36: tasks.aiming.distances: 5 m is listed twice; write each distance once, and decimals with a point: [1.5, 2.5, 4]"),
         ("aiming", "[2, 3, 4, 6]", "2 m", "20:36: tasks.aiming.distances is '2 m'; it must be a list: [.., ..]"),
         ("aiming", "feedback: group", "feedback: grup", "39:41: sessions[1].steps[2].block.feedback: it is 'grup'; did you mean 'group'?"),
         ("aiming", "on_fault", "  - {name: acquisition, steps: [consent]}\non_fault", "41:12: two sessions are called 'acquisition'; give each a name of its own"),
@@ -208,7 +208,7 @@ OWN = (
     [
         ("use: sphere", "use: sphere, colour: [40, 190, 255]", "feedback.ball.colour[1] is 40; it must be less than or equal to 1"),
         ("camera: cab}", "camera: {eye: [1, 2, 3], look: [1, 2, 3]}}", "look is where its eye is; write a point"),
-        ("camera: cab}", "font: protocol.yaml}", "views.operator.font: 'protocol.yaml' is no font file;"),
+        ("camera: cab}", "font: protocol.yaml}", "views.operator.font: 'protocol.yaml' is not a font file;"),
         ("camera: cab}", "patch: {on: []}}", "views.operator.patch.on is []; it needs at least 1"),
         ("camera: cab}", "patch: {on: [trial.end, trial.end]}}", "views.operator.patch.on has 'trial.end' twice; write it once"),
         ("camera: cab}", "areas: [tip, tip]}", "views.operator.areas has 'tip' twice; write it once"),
@@ -217,14 +217,14 @@ OWN = (
         ("on_fault", "page: {host: '127.0.0.1:80'}\non_fault", "page.host: '127.0.0.1:80' is not an address; "),
         ("on_fault", "page: {host: http://lab}\non_fault", "page.host: 'http://lab' is not an address; "),
         ("on_fault", "page: {colour: blue}\non_fault", "page.colour is 'blue'; it must be red, green and blue in hexadecimal,"),
-        ("on_fault", OWN % ("kind: choice, choices: [x, y, x]", ""), "'x' is there twice; write each once"),
+        ("on_fault", OWN % ("kind: choice, choices: [x, y, x]", ""), "'x' is listed twice; write each once"),
         ("on_fault", OWN % ("choices: [x, y]", ""), "has choices, and its kind is 'scale'; write kind: choice, or leave"),
         ("on_fault", OWN % ("step: 1", "sums: {s: [b]}"), "questionnaires.q.sums.s[1] is 'b', and there is no such question with numbers; it has a"),
         ("on_fault", OWN % ("kind: text", "sums: {s: [a]}"), "is 'a', and there is no such question with numbers; it has none"),
         ("on_fault", OWN % ("step: 1", "sums: {s: [a, a]}"), "questionnaires.q.sums.s has 'a' twice; write it once"),
         ("on_fault", OWN % ("step: 1", "sums: {s: []}"), "questionnaires.q.sums.s is []; it needs at least 1"),
-        ("on_fault", "operator: {use: simulated_operator, axes: [-left.x]}\non_fault", "'-left.x' is turned round, which only a scheme's map says"),
-        ("on_fault", "operator: {use: simulated_operator, button: left.trigger}\non_fault", "button is there without axes"),
+        ("on_fault", "operator: {use: simulated_operator, axes: [-left.x]}\non_fault", "'-left.x' is reversed, but only a scheme's map can"),
+        ("on_fault", "operator: {use: simulated_operator, button: left.trigger}\non_fault", "button is given without axes"),
         ("on_fault", "operator: {use: simulated_operator, axes: [left.w]}\non_fault", "operator.axes[1] is 'left.w', and there is no such axis of the input; did you mean 'left.y'?"),
     ],
 )  # fmt: skip
@@ -611,7 +611,7 @@ def test_a_file_that_a_run_would_open_is_looked_into(
     (line,) = told("aiming", AIMING.replace(old, new))
     assert line.startswith(said), line
     assert re.search(
-        "which is a folder; name|is no font; give|export the picture|cannot be read|holds no keys; it must",
+        "which is a folder; name|is not a font; give|export the picture|cannot be read|holds no keys; it must",
         line,
     ), line
 
@@ -673,7 +673,7 @@ TRACK = "design:\n  tracks: {t: {factor: pairs, levels: {2m_far_left: 2, 4m_far_
     ("old", "new", "at", "said"),
     [
         ("camera: cab", "camera: {eye: [1, 2, 3], look: [1, 2, 3]}", "[1, 2, 3]}", "look is where its eye is"),
-        ("camera: cab", "camera: {eye: [1, 2, 3], on: slew, look: targets}", "targets}", "cannot hold the targets"),
+        ("camera: cab", "camera: {eye: [1, 2, 3], on: slew, look: targets}", "targets}", "cannot keep the targets"),
         ("camera: cab", "beside: [{eye: [1, 2, 3], look: targets, depth_m: [3, 2]}]", "[3, 2]", "must be farther away"),
         ("design:", QUESTION % "kind: choice" + "design:", "choice}", "has no choices"),
         ("design:", QUESTION % "kind: scale, choices: [a, b]" + "design:", "[a, b]", "has choices"),

@@ -21,7 +21,7 @@ MOST = LIMITS["CSV table"].most
         (b"participant,age\nP001,\0\n", "line 2 contains a NUL character; remove it"),
         (b"participant,age\nP001," + b"9" * 140_000, "field larger than field limit"),
         (b"participant,age\nP001,30,left\n", "line 2: this row has more or fewer cells"),
-        (b"participant,age\nP001,30\nP001,31\n", "line 3: 'P001' is there twice; keep one row"),
+        (b"participant,age\nP001,30\nP001,31\n", "line 3: 'P001' is listed twice; keep one row"),
         (b"participant,age\nP001\n", "line 2: this row has more or fewer cells"),
         (gzip.compress(b"participant,age\n", mtime=0)[:-9], "it is gzipped, and damaged"),
     ],

@@ -42,9 +42,9 @@ class TestCanPanel(InputContract):  # "can"
         ("tty:/dev/ttyACM0", "python-can has no interface 'tty'; it has canalystii,"),
         (
             "socketcan:/dev/can0",
-            "'/dev/can0' is no network interface; write its name, as",
+            "'/dev/can0' is not a network interface; write its name, as",
         ),
-        ("socketcan:a_much_too_long_name", "is no network interface"),
+        ("socketcan:a_much_too_long_name", "is not a network interface"),
     ],
 )
 def test_a_bus_that_python_can_does_not_know_is_refused(bus: str, said: str) -> None:
@@ -178,7 +178,7 @@ def test_a_garbled_line_is_refused_and_the_next_frame_obeyed(garbled: bytes) -> 
         assert device._listener.lost is None
         if garbled.startswith(b"T"):
             assert device._commands.refused == 3
-            assert device._commands.why.startswith("the adapter's line is no frame (")
+            assert device._commands.why.startswith("the adapter's line is not a frame (")
     finally:
         device.close()
         adapter.unplug()

@@ -260,10 +260,10 @@ def test_two_signals_of_one_name_and_no_map_at_all_are_refused(panel: Path, caps
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--bus", "can0"], "bus: 'can0' is no bus; write interface:channel, as slcan:/dev"),
+        (["--bus", "can0"], "bus: 'can0' is not a bus; write interface:channel, as slcan:/dev"),
         (
             ["--bus", "socketcand:can0@host:abc"],
-            "bus: 'abc' is no port; write socketcand:channel@host:port, or leave the port out",
+            "bus: 'abc' is not a port; write socketcand:channel@host:port, or omit the port",
         ),
         (["--valve", "boom=Levers.Boom"], "which only a DBC file explains; give map, or the"),
         (["--valve", "boom=16"], "valves.boom"),

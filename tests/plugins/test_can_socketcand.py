@@ -111,7 +111,7 @@ def test_a_panel_behind_socketcand_is_read_told_lost_and_found_again(server: Ser
         assert server.said[:2] == ["< open can0 >", "< rawmode >"]
         server.hang_up()
         read_until(lambda axes: not any(axes))
-        why = f"{bus} is gone: nothing was heard for 1 s; it is dialled again"
+        why = f"{bus} is gone: no data came for 1 s; the connection is being reopened"
         read_until(lambda _: device.fault in {why, None})
         read_until(lambda axes: axes == [0.2, -0.5, 0.0, 1.0])  # it was dialled again
         assert device.fault is None

@@ -386,7 +386,7 @@ def test_the_papers_own_rule_is_a_line_from_0_that_other_runs_do_not_bend(
 @pytest.mark.parametrize(
     ("words", "refused"),
     [
-        (("--levels", "40;80"), "--levels '40;80' is no list of signals; write whole numbers"),
+        (("--levels", "40;80"), "--levels '40;80' is not a list of signals; write whole numbers"),
         (("--levels", "-40,80"), "--levels has -40; write sizes above 0, each is used in both"),
         (("--levels", ""), "a model needs at least one level; write the signals of its layers"),
         (("--validation", "20,80"), "signal 80 is to validate the model and to be fitted; leave"),

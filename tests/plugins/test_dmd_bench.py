@@ -144,7 +144,7 @@ def test_the_command_drives_the_arm_and_leaves_the_papers_tables(
     assert main(["dmd", "fit", str(short), "--out", str(model), *grid]) == 0
     words = ["dmd", "validate", str(model), str(short), "--out", str(out), "--drive"]
     assert main(words) == 2
-    assert "say of which: --machine ied_arm.yaml" in capsys.readouterr().err
+    assert "name the machine: --machine ied_arm.yaml" in capsys.readouterr().err
     assert main([*words, "--machine", str(RETRIEVAL / "ied_arm.yaml")]) == 0
     table = pd.read_csv(out / "driven.csv")
     assert list(table.signal) == [-220, 0, 220] * 3
@@ -283,7 +283,7 @@ def test_a_replayed_log_becomes_a_recording_that_fit_reads(
     first = rows[0][2]
     assert raw[raw.what == "angle_deg"].value.iloc[0] == pytest.approx(first, abs=5e-4)
     assert main(words) == 2
-    assert "is there already, and recordings are not written over" in capsys.readouterr().err
+    assert "already exists, and recordings are not overwritten" in capsys.readouterr().err
     again = tmp_path / "again"
     raw_words = ["dmd", "record", str(again), "--segment", "boom", "--signal", "-", "--angle", "-"]
     assert main([*raw_words, "--log", str(folder / "raw" / "boom.csv")]) == 0
@@ -324,7 +324,7 @@ def test_a_log_whose_clock_was_set_back_tells_no_speed(tmp_path: Path) -> None:
     rows[40:] = [(now - 3.0, *rest) for now, *rest in rows[40:]]
     bus_log(tmp_path / "drive.log", rows, cantools.database.load_file(panel))
     values = CanValues("Levers.Boom", "Encoders.Boom", panel, 100.0)
-    said = r"drive.log goes back by 2\.\d+ s at its frame 81, so that no speed can be told there"
+    said = r"drive.log goes back by 2\.\d+ s at its frame 81, so the speed there is unknown"
     with pytest.raises(RecordingError, match=said):
         list(read_log(tmp_path / "drive.log", values))
 

@@ -68,7 +68,7 @@ def test_a_range_that_does_not_ascend_is_an_error_with_the_file(config):
     )
     with pytest.raises(DeviceError, match="must ascend, but are 5, 0 and 3") as refused:
         load(config, MODEL)
-    assert str(refused.value).startswith(f"{config}: what it says of 044f:b10a is wrong at left.x")
+    assert str(refused.value).startswith(f"{config}: the entry 044f:b10a is wrong at left.x")
 
 
 @pytest.mark.parametrize("text", ["[1", "- a\n", "\x00"])
@@ -183,7 +183,7 @@ def test_what_the_procedure_finds_is_what_the_device_uses(table, config):
     set_up(JoystickSettings(), config, said.append, hands.look)
     assert said[-1] == f"stored in {config}"
     assert said[1].startswith("attached: Thrustmaster T.16000M (044f:b10a, 4 axes, 16 buttons)")
-    assert "only their order tells them apart" in said[2]
+    assert "only their order tells left from right" in said[2]
     assert "  x: -30000 to 28000, at rest 700" in said
     assert "  slider: -25000 to 31000, at rest 3000" in said
     device = DualJoystick(JoystickSettings())

@@ -147,7 +147,7 @@ def test_every_so_manieth_row_is_that_of_all_rows(person: Participant) -> None:
     [
         ("fre", r"camera 'fre': there is no such camera as 'fre'; did you mean 'free'\?"),
         ({"name": "x"}, r"camera \{'name': 'x'\}: Field required"),
-        ({**OWN, "on": "tail"}, "camera 'mine' rides on 'tail', which the machine has not"),
+        ({**OWN, "on": "tail"}, "camera 'mine' is attached to 'tail', which this machine does not"),
     ],
 )
 def test_a_camera_that_cannot_be_is_refused_in_words(

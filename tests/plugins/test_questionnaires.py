@@ -81,7 +81,7 @@ def test_demographics_ask_what_the_study_says_in_its_order() -> None:
         ("gender", ("weiblich", "männlich")),
         ("age", ()),
     ]
-    with pytest.raises(ValidationError, match="'age' is there twice; write each once"):
+    with pytest.raises(ValidationError, match="'age' is listed twice; write each once"):
         DemographicsSettings(ask=("age", "age"))
 
 
@@ -298,7 +298,7 @@ def test_words_at_no_step_are_refused(tmp_path: Path, words: str, said: str) -> 
     question = {"name": "a", "text": "A", "words": {0: "never", 11: "always"}}
     with pytest.raises(ValidationError, match="'a' has words at 11, and takes 0 to 10"):
         FreeSettings.model_validate({"title": "T", "questions": [question]})
-    with pytest.raises(ValidationError, match="'a' is no scale and has words"):
+    with pytest.raises(ValidationError, match="'a' has words, but is not a scale"):
         FreeSettings.model_validate({"title": "T", "questions": [{**question, "kind": "text"}]})
 
 

@@ -224,7 +224,7 @@ def test_a_font_that_does_not_exist_is_named() -> None:
 
 def test_a_camera_on_a_link_that_does_not_exist_is_refused() -> None:
     camera = CameraSettings(name="c", eye=(0, 0, 0), look=(1, 0, 0), on="gripper")
-    with pytest.raises(ProtocolError, match="rides on 'gripper', which the machine has not"):
+    with pytest.raises(ProtocolError, match="attached to 'gripper', which this machine does not"):
         View(ViewSettings(camera=camera), MACHINE)
 
 

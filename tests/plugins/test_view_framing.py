@@ -79,5 +79,5 @@ def test_a_camera_that_cannot_hold_the_targets_is_refused() -> None:
     around = 3.0 * np.array([[1.0, 0.0, 0.0], [-1.0, 0.1, 0.0], [0.0, 1.0, 0.0]])
     with pytest.raises(ProtocolError, match=r"^camera 'c' at \(0, 0, 0\) m is too close to the"):
         framed("c", np.zeros(3), around, 1.5)
-    with pytest.raises(ValidationError, match="rides on 'wrist' cannot hold the targets in its"):
+    with pytest.raises(ValidationError, match="attached to 'wrist' cannot keep the targets in its"):
         CameraSettings(eye=(0, 0, 0), look="targets", on=MACHINE.names[-1])

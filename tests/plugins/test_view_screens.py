@@ -156,7 +156,7 @@ def test_a_monitor_that_is_not_there_is_refused_and_so_is_a_wrong_order() -> Non
 
 
 def test_settings_that_contradict_each_other_are_refused() -> None:
-    with pytest.raises(ValidationError, match="screen and screens are both there; write one"):
+    with pytest.raises(ValidationError, match="screen and screens cannot be combined; drop one"):
         ViewSettings(screen=1, screens=(1, 2))
     with pytest.raises(ValidationError, match="screens shows one wide picture, and beside asks"):
         ViewSettings(screens=(1, 2), beside=("free",))

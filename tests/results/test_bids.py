@@ -198,7 +198,7 @@ def test_missing_files_of_people_are_named(cohort: Cohort, tmp_path: Path) -> No
     ("table", "description", "words"),
     [
         ("person,score\nP001,35\n", "{}", "has no column 'participant'; its columns are person, "),
-        ("participant,score\nP001,35\n", "{", "tlx.json is no JSON: .*; correct it there"),
+        ("participant,score\nP001,35\n", "{", "tlx.json is not valid JSON: .*; correct the file"),
         ("participant,score\nP001,35\n", "[]", "tlx.json holds list; it must hold an object"),
     ],
 )

@@ -59,7 +59,7 @@ def test_gaze_has_its_place_first_and_says_in_which_system(bids: Path) -> None:
         assert about["x_coordinate"]["Units"] == "px"
         systems.append(about["SampleCoordinateSystem"])
     assert systems == ["gaze-on-screen", "eye-in-head", "custom"]
-    assert about["SampleCoordinateSystemDescription"].startswith("in px; of which picture")
+    assert about["SampleCoordinateSystemDescription"].startswith("in px; the picture that it")
 
 
 @pytest.mark.slow

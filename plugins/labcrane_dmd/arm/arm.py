@@ -28,7 +28,7 @@ class DmdArm(Dynamics):
     """Joints whose valves give the speeds of a model, with drives of limited force behind them.
 
     Takes ``valve.signal`` from the scheme, or where that is missing its ``command`` as a share of
-    the machine's joint speeds. Every reset starts the engine anew, because setting joints by hand
+    the machine's joint speeds. Every reset restarts the engine, because setting joints by hand
     leaves contact caches behind.
     """
 
@@ -118,7 +118,7 @@ class DmdArm(Dynamics):
             drive.reset()
         for watch in self._overloads:
             watch.reset()
-        # As forces are: the tick in which a drive sets its joint in motion is no overload.
+        # Averaged like forces: the tick in which a drive starts its joint is not an overload.
         ticks = max(1, round(self._settings.window_s / self._dt))
         self._loads = [ContactWindow(ticks) for _ in angles]
         self._disconnect()

@@ -9,10 +9,10 @@ from labcrane_dmd.arm.engine import pybullet
 from labcrane_dmd.arm.scene_bodies import StandingBody
 
 BELOW_M = 20.0
-"""As far down as is looked for what is under a thing."""
+"""Distance in which the search looks for what is under a thing."""
 
 BODY, POINT = 0, 3
-"""Places of the body and of the point in what the engine says of a ray."""
+"""Indices of the body and of the point in the engine's result for a ray."""
 
 NEAR_M = 0.01
 """A thing has left the jaws when neither of them is nearer to it than this, in metres."""
@@ -148,7 +148,7 @@ class Grip:
 
     def _near(self, loose: Loose, jaw: int) -> bool:
         body, client = loose.standing.body, self._client
-        # Of somebody it is the limb that was held; the others may touch the arm wherever they lie.
+        # For a casualty, only the held limb counts: the other limbs may touch the arm anywhere.
         limb = {"linkIndexB": loose.link} if loose.standing.placed.jointed else {}
         return bool(
             pybullet.getClosestPoints(
@@ -169,16 +169,16 @@ class Grip:
         self.force, self.height = 0.0, self._height(each, touched)
 
     def _boxes(self, standing: StandingBody, link: int) -> list[tuple[Sequence[float], ...]]:
-        """Return the boxes around a thing's parts; of somebody, around the limb in the jaws."""
+        """Return the boxes around a thing's parts; for a casualty, around the limb in the jaws."""
         links = [link] if standing.placed.jointed else list(standing.parts)
         client = self._client
         return [pybullet.getAABB(standing.body, each, physicsClientId=client) for each in links]
 
     def _height(self, standing: StandingBody, link: int) -> float:
-        """Return how far a thing could fall, in m: of somebody, the limb in the jaws.
+        """Return how far a thing could fall, in m; for a casualty, the limb in the jaws.
 
-        That is from its lowest height straight down to the first thing that is neither the arm nor
-        what is held, under its middle.
+        This is the distance from its lowest point straight down, under its middle, to the first
+        thing that is neither the arm nor held.
         """
         body, client = standing.body, self._client
         boxes = self._boxes(standing, link)

@@ -25,7 +25,7 @@ STOP_NM = 1e4
 """Torque that the stop of a hinge can give, in N m; the engine's own is weak (bullet3 #2944)."""
 
 LINK_NAME = 12
-"""Place of the name in what the engine says of a joint and the link behind it."""
+"""Index of the link's name in the engine's description of a joint."""
 
 DISTANCE = 8
 """Place of the distance in the engine's closest points; below 0 inside each other."""

@@ -107,7 +107,7 @@ class ArmSettings(Settings):
 
     scenes: tuple[StudyPath, ...] = ()
     """Scene files whose objects, figures and obstacles the arm can touch. The trial's condition
-    ``scenario`` says which of them stands there."""
+    ``scenario`` selects the scene."""
 
     jaws: JawsSettings | None = None
     """The jaws, if the arm has any."""
@@ -151,7 +151,7 @@ class ArmSettings(Settings):
         described = written.get("segments") if isinstance(written, dict) else None
         if not isinstance(described, dict):
             raise ProtocolError(
-                f"dynamics.model is {self.model.name!r}, which is no model: it has no segments; "
+                f"dynamics.model is {self.model.name!r}, which is not a model: it has no segments; "
                 "make one with labcrane dmd fit",
                 at=("model",),
             )

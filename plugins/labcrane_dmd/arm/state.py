@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Felt:
-    """What the state says of one thing.
+    """The entries of the state about one thing.
 
     Attributes
     ----------
@@ -34,10 +34,10 @@ class Felt:
 
 
 Parts = Mapping[str, Felt]
-"""What the state says of every thing, by its name."""
+"""The entries of the state about every thing, by its name."""
 
 LIMIT_RAD = 1e-3
-"""A joint this close to the end of its range stands there."""
+"""A joint this close to the end of its range is at the end."""
 
 GRIP = {"thing": "1", "force": "N", "height": "m", "loose": "1", "slipped": "1", "left": "1"}
 """Which thing is held, counted from 1 in the order of the state; what pulls at it; how far it could
@@ -125,7 +125,7 @@ def _pose_signals(name: str) -> tuple[Signal, Signal]:
 
 
 class ArmState:
-    """One array that is filled anew on every tick."""
+    """One array that is refilled on every tick."""
 
     def __init__(self, machine: Machine, parts: Parts, links: tuple[str, ...]) -> None:
         self._links = links
@@ -217,7 +217,7 @@ class ArmState:
 
 
 def _absent(felt: Felt) -> list[float]:
-    """Return what the state says of a thing that is not in the trial's scene."""
+    """Return the entries of the state about a thing that is not in the trial's scene."""
     forces = [0.0] * len(felt.parts)
     if not felt.moves:
         return forces

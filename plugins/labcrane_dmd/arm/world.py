@@ -18,15 +18,16 @@ ITERATIONS = 400
 """Solver passes per tick; with the engine's 50, joints creep under their own weight."""
 
 JOINTED_ITERATIONS = 150
-"""Where somebody with joints lies: many more contacts, and with 400 passes a tick would take three
-times as long. The arm creeps by 5e-12 degrees in a second; with 50 it would by 4e-4."""
+"""Solver passes with an articulated casualty, who has many more contacts: with 400 passes, a tick
+would take three times as long. The arm creeps by 5e-12 degrees per second; with 50 passes, by
+4e-4."""
 
 LIMIT_FORCE = 1e7
 """In N m. The engine's own is weaker than a drive (bullet3 #2944)."""
 
 
 class World:
-    """Steps the engine; opened anew for every trial, so that the same commands give the same bits.
+    """Step the engine; reopened for every trial, so that the same commands give the same bits.
 
     Parameters
     ----------
@@ -172,7 +173,9 @@ def _engine(dt: float, iterations: int) -> int:
     """Start an engine that steps by ``dt`` in s; return its number."""
     client: int | None = pybullet.connect(pybullet.DIRECT)
     if client is None or client < 0:
-        raise PluginError("PyBullet could not start another engine; end other users of it")
+        raise PluginError(
+            "PyBullet could not start another engine; close other programs that use it"
+        )
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=dt,
         numSubSteps=0,

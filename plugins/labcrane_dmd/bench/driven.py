@@ -72,7 +72,7 @@ def drive(
     rate_hz
         Steps per second.
     tell
-        Is told of each segment before it is driven.
+        Called with each segment before it is driven.
 
     Raises
     ------

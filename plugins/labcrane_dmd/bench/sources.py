@@ -154,7 +154,7 @@ def read_log(path: Path, values: CanValues) -> Iterator[Sample]:
                 if frame.timestamp < last - BACK_S:
                     raise RecordingError(
                         f"the clock of {path} goes back by {last - frame.timestamp:g} s at its "
-                        f"frame {number}, so that no speed can be told there; cut the log there"
+                        f"frame {number}, so the speed there is unknown; cut the log there"
                     )
                 last = frame.timestamp
                 yield from values.read(frame)
@@ -303,7 +303,7 @@ def read_raw(path: Path) -> Iterator[Sample]:
     Raises
     ------
     RecordingError
-        It is no such file.
+        The file does not have this format.
     """
     try:
         with path.open(newline="", encoding="utf-8") as file:
@@ -329,8 +329,8 @@ def kept(samples: Iterator[Sample], path: Path) -> Iterator[Sample]:
         file = path.open("x", newline="", encoding="utf-8")
     except FileExistsError:
         raise RecordingError(
-            f"{path} is there already, and recordings are not written over; give another folder, "
-            f"or cut that one anew: --log {path}"
+            f"{path} already exists, and recordings are not overwritten; give another folder, "
+            f"or cut the existing log again: --log {path}"
         ) from None
     with file:
         writer = csv.writer(file)

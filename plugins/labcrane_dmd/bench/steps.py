@@ -15,7 +15,7 @@ REST_S = 0.5
 """Rest before a step that is part of its run."""
 
 SHORTEST_S = 1.0
-"""A signal that is held for less is no step: a lever on its way, or a touch."""
+"""A signal that is held for less is not a step: the lever was moving, or was only touched."""
 
 STILL_S = 5.0
 """A rest this long, its first second left out, is a run at 0."""
@@ -45,7 +45,7 @@ class ValveStep:
     time, signals, angle
         In seconds from the run's start, and in degrees, shape ``(n_samples,)``; of its rest, too.
     left_out
-        Why it is no run, in words; empty for a run.
+        Why it is not a run, in words; empty for a run.
     """
 
     signal: int

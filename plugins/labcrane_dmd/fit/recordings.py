@@ -110,7 +110,7 @@ def _read(path: Path) -> SegmentRecording:
     try:
         run, time, signal, angle = (table[name].to_numpy(np.float64) for name in COLUMNS)
     except (ValueError, TypeError, OverflowError) as error:  # a number of 400 digits
-        raise RecordingError(f"{path} holds something that is no number: {error}") from error
+        raise RecordingError(f"{path} contains a value that is not a number: {error}") from error
     bad = ~np.isfinite(run + time + signal + angle)
     if bad.any():
         raise RecordingError(

@@ -110,7 +110,7 @@ class SegmentModel:
             The signal is beyond full flow.
         """
         if not is_signal(signal, FULL):
-            raise ProtocolError(f"signal {signal:g} was asked of {self.name!r}; it is -250 to 250")
+            raise ProtocolError(f"{self.name!r}: signal {signal:g} is not within -250 to 250")
         return self.direction(signal).speed(abs(signal), angle, self.between)
 
     def layers(self) -> Iterator[Layer]:

@@ -133,7 +133,7 @@ def load(path: Path | str, between: Between | None = None) -> Model:
         first, *more = str(error).splitlines()
         rest = f", and {len(more)} more" if more else ""
         raise ProtocolError(
-            f"{str(path)!r} is no model: {first}{rest}; make one with labcrane dmd fit",
+            f"{str(path)!r} is not a model: {first}{rest}; make one with labcrane dmd fit",
             at=("model",),
         ) from error
     rule = between or text.fit.between

@@ -12,7 +12,7 @@ DeadBand = Literal["found", "none"]
 
 
 class FitSettings(Settings):
-    """What whoever fits a model may choose."""
+    """Options for fitting a model."""
 
     levels: tuple[PositiveInt, ...] = (40, 80, 120, 160, 200, 250)
     """Signals whose recordings become layers, in both directions; 0 is zero."""

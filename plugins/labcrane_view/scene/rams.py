@@ -67,7 +67,7 @@ def rams(machine: Machine, bodies: Sequence[Body]) -> Iterator[Ram]:
 
 
 def hoses(body: Body) -> Mesh | None:
-    """Return a hose along each side of a link, in its frame; None for what is no beam along x."""
+    """Return a hose along each side of a link, in its frame; None unless it is a beam along x."""
     long, high, wide = body.size
     if long < 2.0 * max(high, wide):
         return None

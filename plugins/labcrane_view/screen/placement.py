@@ -255,8 +255,8 @@ class WindowPlacer:
         """
         if self._failure is not None:
             raise DeviceError(
-                f"the monitors are watched no more: {self._failure!r}; the view is "
-                "started again, and asks anew"
+                f"the monitors can no longer be watched: {self._failure!r}; the view "
+                "restarts and looks for them again"
             ) from self._failure
         there = self._seen
         if not there:

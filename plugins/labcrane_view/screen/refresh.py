@@ -51,13 +51,13 @@ class Refresh:
         return "not possible: pictures wait for the refresh" if self.waits else "possible"
 
     def missed(self, interval_s: float) -> float:
-        """Return how many refreshes showed the picture before again; NaN where nobody can tell."""
+        """Return how many refreshes repeated the previous picture; NaN if this is unknown."""
         if not self.waits:
             return math.nan
         return max(0.0, round(interval_s * self.rate_hz) - 1.0)
 
     def facts(self) -> dict[str, Value]:
-        """Return what the record says of it."""
+        """Return the facts for the record."""
         rate: Value = "not known" if math.isnan(self.rate_hz) else self.rate_hz
         return {"refresh_hz": rate, "buffers": self.buffers, "tearing": self.tearing}
 
@@ -70,7 +70,7 @@ def waited(intervals_s: Sequence[float], rate_hz: float) -> bool | None:
     intervals_s
         Between two returns of the swap, in seconds.
     rate_hz
-        Of the monitor; with NaN nobody can tell, so that the answer is None.
+        Refresh rate of the monitor; if it is NaN, the result is None.
     """
     if math.isnan(rate_hz):
         return None

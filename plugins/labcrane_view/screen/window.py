@@ -214,7 +214,7 @@ def _plain_font() -> Any:
                 core.Filename.from_os_specific(str(path)).get_fullpath()
             )
             if loaded is not None and loaded.is_valid():
-                if loaded.get_num_pages() == 0:  # nobody has written with it yet
+                if loaded.get_num_pages() == 0:  # not yet used
                     loaded.set_pixels_per_unit(SHARP)
                 return loaded
     return core.TextNode.get_default_font()
