@@ -13,15 +13,15 @@ class BidsSettings(Settings):
     """Settings of :class:`~labcrane_bids.bids.Bids`."""
 
     every: PositiveInt = 1
-    """Which ticks are written: 1 all of them, 3 every third. Motion files are text and cannot be
-    compressed; the participant file keeps all."""
+    """Which ticks are written: 1 for all, 3 for every third. Motion files are text and cannot be
+    compressed; the participant file keeps all ticks."""
 
     shift_dates: bool = True
-    """Whether dates are moved, for each participant so that the first session is on 1 January
-    1925: intervals and times of day stay, dates cannot be traced."""
+    """Whether dates are shifted so that each participant's first session is on 1 January 1925.
+    Intervals and times of day stay; the real dates cannot be traced."""
 
     ethics: tuple[str, ...] = ()
-    """Ethics approvals, as in ``board, reference``; those in the recordings are added."""
+    """Ethics approvals, as in ``board, reference``, in addition to those in the recordings."""
 
     authors: tuple[str, ...] = ()
     """Who made the data set."""
@@ -30,22 +30,22 @@ class BidsSettings(Settings):
     """SPDX name of the licence."""
 
     people: Path | None = None
-    """A CSV file with the columns participant, age, sex, handedness and group, as far as known;
-    what it says replaces what was recorded."""
+    """CSV file with the columns participant, age, sex, handedness and group, as far as known. Its
+    values replace the recorded ones."""
 
     phenotype: Path | None = None
-    """A folder of CSV files, one per questionnaire, each with a column participant and a JSON file
-    of the same name that says what its columns are."""
+    """Folder of CSV files, one per questionnaire. Each has a column participant, and a JSON file of
+    the same name that describes its columns."""
 
     gaze_system: str = ""
-    """What gaze is measured in, as ``gaze-on-screen``; by default as the unit of x says, and of
-    pixels what the protocol or the stream's header says that they are of."""
+    """Coordinate system of gaze, as in ``gaze-on-screen``. The default follows the unit of x; for
+    pixels, the protocol or the stream's header states their picture."""
 
     eeg_reference: str = ""
-    """Where the reference electrode of EEG was, as in ``FCz``."""
+    """Position of the EEG's reference electrode, as in ``FCz``."""
 
     eeg_unit: str = ""
-    """Unit of channels of EEG whose source states none, as in ``microvolts``."""
+    """Unit of EEG channels whose source states none, as in ``microvolts``."""
 
     power_line_hz: Annotated[NonNegativeFloat, Usual(15.0, 500.0)] = 0.0
-    """Frequency of the mains where EEG was recorded; 0 where it is not known."""
+    """Mains frequency where the EEG was recorded, in Hz; 0 if unknown."""

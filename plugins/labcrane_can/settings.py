@@ -26,7 +26,7 @@ BUS = r"^[a-z0-9_]+:.+$"
 FAMILIAR = frozenset(
     {"slcan", "socketcan", "socketcand", "pcan", "kvaser", "vector", "virtual", "udp_multicast"}
 )
-"""Interfaces for which python-can need not be asked, which takes long to load."""
+"""Interfaces that are known without loading python-can, which takes long."""
 
 Valve = Annotated[int, Field(ge=1, le=15)]
 """Number of an auxiliary valve; 0 is "power beyond" and moves no joint."""
@@ -37,22 +37,22 @@ DbcSignal = Annotated[str, Reference("signal of the map", own=True)]
 
 
 class ValveMap(Settings):
-    """Which messages are the commands of which joints."""
+    """The assignment of valve commands to joints."""
 
     valves: Annotated[dict[JointName, Valve | DbcSignal], Once()]
-    """For each joint the number of its auxiliary valve, or with ``map`` the name of message and
+    """For each joint, the number of its auxiliary valve; with ``map``, the names of message and
     signal: ``Levers.Boom``."""
 
     map: StudyPath | None = None
-    """A DBC file, for panels that send no auxiliary valve commands."""
+    """DBC file, for panels that do not send auxiliary valve commands."""
 
     neutral: float = 0.0
     """Value of a DBC signal at rest, where the valve is shut, in the signal's own unit: 50 for a
     lever that counts from 0 to 100."""
 
     full: float = 100.0
-    """Value of a DBC signal that is full flow, in the signal's own unit; as far on the other side
-    of ``neutral`` is full flow the other way."""
+    """Value of a DBC signal at full flow, in the signal's own unit. The same distance on the other
+    side of ``neutral`` is full flow in the other direction."""
 
     node: Node | None = None
     """Source address of the panel; any by default."""
@@ -61,8 +61,8 @@ class ValveMap(Settings):
     """Priority of the panel's messages; any by default. Auxiliary valve commands have 3."""
 
     timeout_s: PositiveFloat = 0.25
-    """Age, in seconds, at which a valve's last command counts no more and the valve shuts; the
-    panel is lost when that is so of all of them, or of one that was open."""
+    """Age, in seconds, at which a valve's last command expires and the valve shuts. The panel is
+    lost when the commands of all valves, or of an open valve, have expired."""
 
     def provides(self, machine: Machine) -> Names:
         pairs = [f"{what}.{joint}" for what in ("valve", "float") for joint in self.valves]

@@ -15,22 +15,22 @@ class KeyboardSettings(Settings):
     """Settings of :class:`labcrane_keyboard.keyboard.Keyboard`."""
 
     view: ViewName
-    """Name of the view whose window has the keyboard's focus; the keys must be among its own."""
+    """Name of the view whose window has the keyboard's focus; its ``keys`` must include these."""
 
     axes: dict[str, tuple[SentKey, SentKey]] = Field(min_length=1)
-    """Two keys for each axis: the one towards -1, and the one towards 1. A scheme maps the axes as
-    ``keyboard.NAME``."""
+    """Two keys for each axis: the first towards -1, the second towards 1. A scheme refers to an
+    axis as ``keyboard.NAME``."""
 
     ramp_s: NonNegativeFloat = 0.3
-    """Time in which an axis goes from rest to full while its key is held, in seconds; 0 is at
-    once."""
+    """Time in which an axis goes from rest to full while its key is held, in seconds; with 0 it
+    jumps."""
 
     fall_s: NonNegativeFloat = 0.1
-    """Time in which it goes from full to rest when the key is let go."""
+    """Time in which an axis returns from full to rest when its key is released, in seconds."""
 
     timeout_s: PositiveFloat = 0.5
-    """Silence of the view, in seconds, after which the keyboard is lost and all axes are at
-    rest."""
+    """Time without data from the view, in seconds, after which the keyboard is lost and all axes
+    are at rest."""
 
     def provides(self, machine: Machine) -> Names:
         return {"axis": [*(f"keyboard.{name}" for name in self.axes), "view.connected"]}

@@ -16,11 +16,11 @@ class EpisodeSettings(Settings):
     condition follow it."""
 
     every: PositiveInt = 1
-    """Every how many ticks there is a row; 8 makes 30 rows a second of 240."""
+    """Number of ticks per row; 8 gives 30 rows a second at 240 Hz."""
 
     cameras: tuple[str | dict[str, Any], ...] = ()
-    """Cameras whose pictures are taken now, of the recorded frames: names of those of the view, or
-    ones that are written out, ``{name: hook, eye: [...], look: [...], on: wrist}``."""
+    """Cameras that the export renders from the recorded frames: names of the view's cameras, or
+    settings of other cameras, ``{name: hook, eye: [...], look: [...], on: wrist}``."""
 
     size: Annotated[tuple[PositiveInt, PositiveInt], Unit("px")] = (320, 240)
     """Width and height of a picture, in pixels."""

@@ -16,7 +16,7 @@ from labcrane import Machine, Settings
 from labcrane.core import ButtonName, InputAxis, Names, Once, Usual, WrongKey
 
 CONNECTED = "operator.connected"
-"""Axis that says that it is there, where it has no joysticks."""
+"""Axis that reports that the operator is connected, if it has no joysticks."""
 
 STICK = ("x", "y", "twist", "slider", "trigger", "connected")
 
@@ -24,8 +24,8 @@ STICK = ("x", "y", "twist", "slider", "trigger", "connected")
 class OperatorSettings(Settings):
     """A person who sees a target, aims, and corrects until the tip rests in it.
 
-    The values are ours: plausible for a rate-controlled crane, and never a result. They show
-    that a study runs, not how people behave.
+    The values are assumed: plausible for a rate-controlled crane, but not measured. They show that
+    a study runs, not how people behave.
     """
 
     reaction_s: PositiveFloat = 0.35
@@ -35,10 +35,10 @@ class OperatorSettings(Settings):
     """Standard deviation of the logarithm of the reaction time."""
 
     lapse_rate: float = Field(default=0.0, ge=0.0, le=1.0)
-    """Probability that the eyes are elsewhere when a trial's target appears."""
+    """Probability that the operator looks elsewhere when a trial's target appears."""
 
     lapse_s: PositiveFloat = 2.0
-    """How much later the movement then begins, in seconds."""
+    """Delay of the movement after a lapse, in seconds."""
 
     fitts_a_s: NonNegativeFloat = 1.0
     """Intercept of Fitts' law for one sub-movement, in seconds."""
@@ -47,18 +47,18 @@ class OperatorSettings(Settings):
     """Slope of Fitts' law, in seconds per bit of log2(distance / width + 1)."""
 
     learning_gain: NonNegativeFloat = 0.5
-    """How much longer the first movement of a session takes, as a fraction of a practised one."""
+    """Additional time of a session's first movement, as a fraction of a practised movement."""
 
     learning_rate: NonNegativeFloat = 0.1
-    """How fast that wears off, per trial: the gain falls with exp(-rate · trials)."""
+    """Rate, per trial, at which this additional time decays: with exp(-rate · trials)."""
 
     pace_sd: Annotated[NonNegativeFloat, Usual(0.001, 3.0)] = 0.0
-    """Standard deviation over participants of the logarithm of their durations; drawn from the
+    """Standard deviation, over participants, of the logarithm of their durations; sampled with the
     participant's seed."""
 
     endpoint_noise: NonNegativeFloat = 0.04
-    """Standard deviation of where a sub-movement ends, along its direction, as a fraction of its
-    length; half of it to the sides."""
+    """Standard deviation of a sub-movement's end point along its direction, as a fraction of its
+    length; half as much to the sides."""
 
     motor_noise: NonNegativeFloat = 0.05
     """Standard deviation of the hands' speed along each axis, as a fraction of that speed."""
@@ -67,31 +67,32 @@ class OperatorSettings(Settings):
     """Correlation time of the motor noise, in seconds."""
 
     gain_per_s: PositiveFloat = 1.5
-    """Tip speed per distance from the planned path with which it is corrected, in 1/s."""
+    """Speed of the correction per distance from the planned path, in 1/s."""
 
     patience_m: PositiveFloat = 0.6
-    """Distance of the tip behind the plan, in metres, at which the plan waits for the machine;
-    from half of it on, it goes slower."""
+    """Distance of the tip behind the plan, in metres, at which the plan waits for the machine; the
+    plan slows down from half of this distance."""
 
     look_s: PositiveFloat = 0.25
-    """Time from the end of a sub-movement until its outcome has been seen, in seconds."""
+    """Time from the end of a sub-movement until the operator has seen its outcome, in seconds."""
 
     inside: float = Field(default=0.8, gt=0.0, le=1.0)
-    """Distance from the target's centre that is taken for inside, as a fraction of its radius."""
+    """Distance from the target's centre that the operator treats as inside, as a fraction of its
+    radius."""
 
     still_m_s: PositiveFloat = 0.015
-    """Tip speed that is taken for rest, in m/s; also the smallest speed that is steered."""
+    """Tip speed that the operator treats as rest, in m/s; also the smallest commanded speed."""
 
     press_s: PositiveFloat = 0.1
     """How long the trigger of the right stick, or ``button``, is pressed at rest inside the target,
     in seconds."""
 
     axes: Annotated[tuple[InputAxis, ...], Once()] = ()
-    """Axes of the input that it stands in for, where those are not of two joysticks:
-    ``[keyboard.slew, keyboard.boom]``. Without it, it has what two joysticks have."""
+    """Axes of the input that the operator replaces, if these are not two joysticks:
+    ``[keyboard.slew, keyboard.boom]``. The default is the axes of two joysticks."""
 
     button: ButtonName | None = None
-    """The button that it presses, where ``axes`` says what it has; none by default."""
+    """The button that the operator presses, if ``axes`` is given; none by default."""
 
     @field_validator("axes")
     @classmethod

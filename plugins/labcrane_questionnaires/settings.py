@@ -31,7 +31,7 @@ NAME = r"^[a-z][a-z0-9_]*$"
 
 
 def unstepped(words: Mapping[float, str], lowest: float, highest: float, step: float) -> str:
-    """Return which words stand at no step of a scale; nothing mostly."""
+    """Return which words do not belong to a step of the scale; empty if all do."""
     scale = Item("scale", "", "scale", lowest, highest, step)
     for at in words:
         try:
@@ -46,18 +46,18 @@ def _twice(names: Sequence[str]) -> list[str]:
 
 
 class RatingSettings(Settings):
-    """Of what labcrane words itself."""
+    """Settings of questionnaires whose wording comes from labcrane."""
 
     language: Literal["en", "de"] = "en"
-    """The language in which it asks."""
+    """Language of the questionnaire."""
 
 
 Asked = Literal["age", "gender", "sex", "handedness", "experience", "gaming"]
-"""What demographics can ask."""
+"""Items that demographics can include."""
 
 
 class DemographicsSettings(RatingSettings):
-    """Of what a study reports of its participants."""
+    """Settings of the demographics that a study reports."""
 
     ask: Annotated[tuple[Asked, ...], Field(min_length=1)] = (
         "age",
@@ -66,7 +66,7 @@ class DemographicsSettings(RatingSettings):
         "experience",
         "gaming",
     )
-    """What is asked, in this order; ask no more than the study reports."""
+    """Items, in this order; ask only what the study reports."""
 
     @field_validator("ask")
     @classmethod
@@ -77,16 +77,16 @@ class DemographicsSettings(RatingSettings):
 
 
 class LabText(Settings):
-    """A questionnaire's words, which may not be passed on: a file of the lab's."""
+    """The wording of a questionnaire that labcrane must not distribute: a file of the lab."""
 
     rights: str = Field(min_length=1)
-    """By whose leave the lab uses these words; recorded."""
+    """The lab's permission to use this wording; it is recorded."""
 
     title: str = ""
-    """What participants read above the questions; the usual name by default."""
+    """Title above the items; the usual name by default."""
 
     items: tuple[str, ...] = Field(min_length=1)
-    """The questions, in the order of the publication."""
+    """The items, in the order of the publication."""
 
     left: str = ""
     """Words at the lowest end of every scale."""
@@ -95,12 +95,12 @@ class LabText(Settings):
     """Words at the highest end of every scale."""
 
     words: dict[float, str] = Field(default_factory=dict)
-    """What is written at steps of every scale, as the publication has it: ``{0: none, 1: slight}``;
-    the page then shows the scale as a list."""
+    """Labels of the steps of every scale, as in the publication: ``{0: none, 1: slight}``. The page
+    then shows the scale as a list."""
 
 
 def _only_the_file(schema: dict[str, Any]) -> None:
-    """Leave out what is read from the file: nobody writes it into a protocol."""
+    """Omit the keys that are read from the file: protocols do not contain them."""
     del schema["properties"]["text"]
     schema["required"].remove("text")
 
@@ -112,7 +112,7 @@ class TlxText(LabText):
     """Words at the ends of the scale of performance, from good to poor."""
 
     pair: str
-    """What each of the pairs is asked by, with {one} and {other} where the scales' titles stand."""
+    """Wording for each pair, with {one} and {other} in the places of the scales' titles."""
 
     @field_validator("items")
     @classmethod
@@ -143,21 +143,21 @@ class TlxText(LabText):
 
 
 def _perhaps_the_file(schema: dict[str, Any]) -> None:
-    """Leave out what is read from the file."""
+    """Omit the keys that are read from the file."""
     del schema["properties"]["text"]
 
 
 class TranslatedSettings(Settings):
-    """Of a questionnaire that comes in English, and in whatever language the lab has a file of."""
+    """Settings of a questionnaire in English, or in the language of a file of the lab."""
 
     model_config = ConfigDict(json_schema_extra=_perhaps_the_file)
 
     language: Literal["en"] = "en"
-    """The language in which it asks without a file."""
+    """Language of the questionnaire without a file."""
 
     file: StudyPath | None = None
-    """YAML file with a translation, beside the protocol: rights, items, and perhaps title, left,
-    right and words."""
+    """YAML file with a translation, in the protocol's folder: rights, items, and optionally title,
+    left, right and words."""
 
     text: LabText | None = None
     """What the file holds; read from it."""
@@ -171,7 +171,7 @@ class TranslatedSettings(Settings):
 
 
 class SusSettings(TranslatedSettings):
-    """Of the system usability scale."""
+    """Settings of the system usability scale."""
 
     @model_validator(mode="after")
     def _words_are_at_steps(self, info: ValidationInfo) -> "SusSettings":
@@ -182,23 +182,23 @@ class SusSettings(TranslatedSettings):
 
 
 class TlxSettings(TranslatedSettings):
-    """Of the NASA task load index."""
+    """Settings of the NASA task load index."""
 
     weighted: bool = False
-    """Whether the fifteen pairs are asked too, for the weighted score."""
+    """Whether the fifteen pairwise comparisons are included, for the weighted score."""
 
     text: TlxText | None = None
     """What the file holds; read from it."""
 
 
 class LabTextSettings(Settings):
-    """Of a questionnaire whose words the lab has to bring."""
+    """Settings of a questionnaire whose wording the lab must provide."""
 
     model_config = ConfigDict(json_schema_extra=_only_the_file)
 
     file: StudyPath
-    """YAML file with the words, beside the protocol: rights, items, and perhaps title, left, right
-    and words."""
+    """YAML file with the wording, in the protocol's folder: rights, items, and optionally title,
+    left, right and words."""
 
     text: LabText
     """What the file holds; read from it."""
@@ -215,7 +215,7 @@ class LabTextSettings(Settings):
 
 
 class WordedSettings(LabTextSettings):
-    """Of a questionnaire whose scales are published with words at their steps."""
+    """Settings of a questionnaire whose published scales have words at their steps."""
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
         if self.text.words:
@@ -228,7 +228,7 @@ class WordedSettings(LabTextSettings):
 
 
 def _lab_file(name: str, info: ValidationInfo) -> Any:
-    """Return what a YAML file beside the protocol holds."""
+    """Return the content of a YAML file in the protocol's folder."""
     folder: Path = (info.context or {}).get("folder", Path())
     path = folder / name
     if not was_run(info) and info.context and (why := outside(path, folder)):
@@ -242,13 +242,13 @@ def _lab_file(name: str, info: ValidationInfo) -> Any:
 
 
 class QuestionSettings(Settings):
-    """One question of a lab's own."""
+    """One item of the lab's own questionnaire."""
 
     name: str = Field(pattern=NAME)
-    """A lower-case word; names the answer in the record."""
+    """Name of the answer in the record: a lower-case word."""
 
     text: str
-    """What is asked."""
+    """Text of the item."""
 
     kind: Literal["scale", "number", "choice", "text"] = "scale"
     """``scale``: steps between two ends; ``number``; ``choice``; ``text``."""
@@ -260,7 +260,7 @@ class QuestionSettings(Settings):
     """Largest number that can be answered."""
 
     step: float = Field(default=1.0, ge=0.0)
-    """Steps of a scale or number; 0 allows everything between."""
+    """Step of a scale or number; 0 allows any value in between."""
 
     left: str = ""
     """Words at the lowest end of a scale."""
@@ -269,13 +269,13 @@ class QuestionSettings(Settings):
     """Words at the highest end of a scale."""
 
     words: dict[float, str] = Field(default_factory=dict)
-    """What is written at steps of a scale: ``{0: never, 5: now and then, 10: always}``."""
+    """Labels of a scale's steps: ``{0: never, 5: now and then, 10: always}``."""
 
     choices: tuple[str, ...] = ()
-    """Of a choice."""
+    """Options of a choice."""
 
     required: bool = True
-    """Whether it has to be answered, or declined, before the questionnaire is handed in."""
+    """Whether it must be answered, or declined, before the questionnaire is submitted."""
 
     @field_validator("choices")
     @classmethod
@@ -338,31 +338,31 @@ def _or_in_the_file(schema: dict[str, Any]) -> None:
 
 
 Number = Annotated[str, Reference("question with numbers", own=True)]
-"""A question that is answered with a number."""
+"""An item that is answered with a number."""
 
 
 class FreeSettings(Settings):
-    """Of a questionnaire of the lab's own, written in the protocol or in a file beside it."""
+    """Settings of the lab's own questionnaire, written in the protocol or in a separate file."""
 
     model_config = ConfigDict(json_schema_extra=_or_in_the_file)
 
     file: StudyPath | None = None
-    """YAML file beside the protocol with title, questions and whatever else can be set here. What
-    it holds takes its place."""
+    """YAML file in the protocol's folder with title, questions and any other of these keys; its
+    content replaces this key."""
 
     title: str
-    """What participants read above the questions."""
+    """Title above the items."""
 
     rights: str = "the lab's own"
-    """Where the words come from."""
+    """Source of the wording."""
 
     questions: tuple[QuestionSettings, ...] = Field(min_length=1)
-    """What is asked, in order."""
+    """The items, in order."""
 
     sums: dict[str, Annotated[tuple[Number, ...], Field(min_length=1), Once()]] = Field(
         default_factory=dict
     )
-    """Scores: the names of the questions whose answers are added, by the score's name."""
+    """Sum scores: for the name of each score, the names of the items that it adds."""
 
     @model_validator(mode="before")
     @classmethod

@@ -26,7 +26,7 @@ from labcrane_schemes.directions import (
 )
 
 DIRECTIONS = {"base": ("x", "y", "z"), "arm": ("radial", "tangential", "vertical")}
-"""What the stick moves the tip along, for each ``frame``."""
+"""Directions in which a stick moves the tip, for each ``frame``."""
 
 
 Direction = Annotated[str, Reference("direction of the frame", own=True)]
@@ -45,14 +45,15 @@ FEWER_AXES = (
 
 
 class HandlingSettings(Settings):
-    """What every scheme does with a stick and near a joint limit."""
+    """Settings of every scheme: shaping of the sticks, and soft stops at joint limits."""
 
     dead_zone: float = Field(default=0.05, ge=0.0, lt=1.0)
-    """Deflection below which nothing moves, as a share of full; the rest is rescaled from its
-    edge, so that motion begins without a jump."""
+    """Deflection below which nothing moves, as a proportion of full deflection. The rest of the
+    range is rescaled, so that motion begins without a jump."""
 
     expo: float = Field(default=0.0, ge=0.0, le=1.0)
-    """Share of the cube in ``(1 - expo) x + expo x³``: larger is finer around the centre."""
+    """Weight of the cubic term in ``(1 - expo) x + expo x³``; a larger value gives finer control
+    around the centre."""
 
     soft_stop_deg: NonNegativeFloat = 5.0
     """Distance from a joint limit, in degrees, over which the joint is slowed to a stop."""
@@ -61,7 +62,7 @@ class HandlingSettings(Settings):
         found = {}
         if self.dead_zone > LARGEST_DEAD_ZONE:
             found["dead_zone"] = (
-                f"is {self.dead_zone:g}, so that a stick moves nothing over most of its way"
+                f"is {self.dead_zone:g}, so that a stick has no effect over most of its range"
             )
         widths = [highest - lowest for lowest, highest in (j.range_deg for j in machine.joints)]
         if 2 * self.soft_stop_deg >= min(widths):
@@ -107,12 +108,12 @@ class EndEffectorSettings(HandlingSettings):
     speed_m_s: Annotated[PositiveFloat | None, Usual(0.02, 5.0)] = None
     """Tip speed at full deflection of one axis, in m/s. By default what the machine's joints
     allow at the study's targets (the median over targets and directions: along the arm, across it
-    and up), so that schemes can be compared."""
+    and up), so that schemes are comparable."""
 
     redundancy: Literal["minimum_norm", "hold_pitch"] = "minimum_norm"
-    """How the joints that are one too many are settled: by the smallest joint speeds, which
-    lets the tip pitch wander and takes load off a joint near its limit; or by keeping the tip
-    pitch, and stopping at the first limit."""
+    """How the redundant joint is resolved. ``minimum_norm`` minimises the joint speeds: the tip's
+    pitch drifts, and a joint near its limit is relieved. ``hold_pitch`` keeps the tip's pitch, and
+    stops at the first limit."""
 
     damping: Annotated[float, Unit("m")] = Field(default=0.2, gt=0.0, le=1.0)
     """Largest damping of the least squares, in metres, reached at a singularity."""

@@ -9,10 +9,10 @@ from labcrane.core import Names
 
 
 class ElectrodeSettings(Settings):
-    """What is expected of the signal of electrodes."""
+    """Expected properties of electrode signals."""
 
     mains_hz: Literal[50, 60] | None = None
-    """Frequency of the mains where the study runs, in Hz; none looks for both."""
+    """Mains frequency where the study runs, in Hz; without a value, both are monitored."""
 
     hum_uv: PositiveFloat = 10.0
     """Mains hum from which it is reported, in microvolts, root mean square."""
@@ -46,7 +46,7 @@ class GazeSettings(Settings):
         return {"stream type": ("Gaze",)}
 
     confidence: PositiveFloat = 0.3
-    """Confidence below which a sample shows no gaze, 0 to 1."""
+    """Confidence, 0 to 1, below which a sample does not count as gaze."""
 
 
 class StickSettings(Settings):
@@ -57,7 +57,8 @@ class ForceSettings(Settings):
     """Whether a force sensor is alive: flat, railing, beyond what it can measure."""
 
     largest: PositiveFloat | None = None
-    """Largest force that the sensor measures, in the unit of its stream; none checks no range."""
+    """Largest force that the sensor measures, in the unit of its stream; without a value, the range
+    is not checked."""
 
 
 class AnySettings(Settings):

@@ -19,10 +19,10 @@ from labcrane.core import Names, Unit, Within, WrongKey, was_run
 
 MOST_OVERTONES = 15
 LOWEST_HZ, HIGHEST_HZ = 40.0, 10_000.0
-"""Between which fundamentals grown-ups hear a sine from any loudspeaker."""
+"""Range of fundamentals in which adults hear a sine from any loudspeaker."""
 
 FULL_SCALE = 1.0
-"""Largest amplitude that a sound device plays; what is above is cut off, and heard as noise."""
+"""Largest amplitude that a sound device plays; a larger one is clipped, and heard as noise."""
 
 ROUNDING = 1e-9
 
@@ -30,59 +30,59 @@ FEWEST_SAMPLES, MOST_SAMPLES = 8000, 192_000
 
 
 def sum_of_partials(overtones: int) -> float:
-    """Return what fundamental and overtones add up to, where the fundamental is 1."""
+    """Return the sum of the amplitudes of fundamental and overtones, with a fundamental of 1."""
     return sum(1.0 / number for number in range(1, 2 + overtones))
 
 
 class SonificationSettings(Settings):
     """How the tone follows the movement, and how it is played.
 
-    The published study names sinusoids with overtones for the distance, not the laws: these are a
-    proposal (logarithmic pitch over two octaves, rising as the tip comes closer).
+    The published study reports sinusoids whose overtones follow the distance, but no formulas. The
+    defaults are our proposal: logarithmic pitch over two octaves, rising as the tip approaches.
     """
 
     far: Annotated[PositiveFloat, Unit("m")] = 4.0
-    """Distance of tip and target, in metres, from which on the tone stays as it is."""
+    """Distance between tip and target, in metres, beyond which the tone no longer changes."""
 
     pitch_hz: tuple[PositiveFloat, PositiveFloat] = (220.0, 880.0)
     """Fundamental far away and at the target, in hertz; equal steps of distance are equal musical
-    intervals. Exchange the two for the other polarity."""
+    intervals. Swap the values to reverse the polarity."""
 
     overtones: tuple[int, int] = (0, 5)
     """Overtones above the fundamental far away and at the target, 0 to 15."""
 
     level: tuple[float, float] = (0.3, 0.3)
-    """Amplitude of the fundamental far away and at the target, 0 to 1, where the tone is softest;
-    see ``weighting``. Overtones add to it: 1/2, 1/3 and so on of it, and all may be 1 together."""
+    """Amplitude of the fundamental far away and at the target, 0 to 1, before ``weighting``.
+    Overtones add 1/2, 1/3 and so on of it; the sum must not exceed 1."""
 
     weighting: Literal["a", "none"] = "a"
-    """``a`` lowers the tone wherever the ear hears its partials better, so that at one ``level`` it
-    is equally loud at every distance, in dB(A); ``none`` leaves the amplitude as it is."""
+    """``a`` lowers the amplitude at pitches to which the ear is more sensitive, so that the same
+    ``level`` is equally loud at every distance, in dB(A); ``none`` keeps the amplitude."""
 
     aside: Annotated[PositiveFloat, Unit("m")] = 2.0
-    """Distance to the side, in metres, at which the tone comes from one side only."""
+    """Lateral distance, in metres, at which the tone comes from one side only."""
 
     pan: Literal["towards", "away", "none"] = "towards"
-    """Whether the tone comes from where the target is, seen from the tip, or from where it is
-    not."""
+    """Whether the tone comes from the side of the target, seen from the tip, or from the opposite
+    side."""
 
     silent_after_s: NonNegativeFloat | None = 0.3
     """Seconds inside the target after which the tone falls silent; null keeps it sounding."""
 
     ramp_s: NonNegativeFloat = 0.015
-    """Seconds a change takes: shorter ones click."""
+    """Duration of a change, in seconds; shorter changes click."""
 
     block: PositiveInt = Field(default=256, ge=16, le=8192)
-    """Samples per block: a change is heard from the next block on."""
+    """Samples per block; a change becomes audible with the next block."""
 
     rate_hz: PositiveInt = 48000
     """Samples per second."""
 
     driver: Literal["portaudio", "jack"] = "portaudio"
-    """Which sound system plays it."""
+    """Sound system that plays the tone."""
 
     device: int | None = None
-    """Number of the output device, as PortAudio counts; the system's default by default."""
+    """PortAudio's number of the output device; the system's default device by default."""
 
     @model_validator(mode="before")
     @classmethod

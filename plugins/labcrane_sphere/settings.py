@@ -14,23 +14,24 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 class SphereSettings(Settings):
     """Where the sphere is, and how it follows the distance.
 
-    The published study names brightness and size, not their laws: these are a proposal.
+    The published study reports that brightness and size change, but no formulas: the defaults are
+    our proposal.
     """
 
     at: Literal["target", "tip"] = "target"
-    """Where it is drawn."""
+    """Position of the sphere."""
 
     far: Annotated[PositiveFloat, Unit("m")] = 4.0
-    """Distance of tip and target, in metres, from which on the sphere stays as it is."""
+    """Distance between tip and target, in metres, beyond which the sphere no longer changes."""
 
     law: Literal["linear", "log"] = "linear"
-    """How it changes with distance; ``log`` changes most near the target."""
+    """How the sphere changes with distance; ``log`` changes most near the target."""
 
     polarity: Literal["shrinks", "grows"] = "shrinks"
-    """What its size does as the tip comes closer."""
+    """How its size changes as the tip approaches the target."""
 
     brightness: Literal["brightens", "darkens", "constant"] = "brightens"
-    """What its brightness does as the tip comes closer."""
+    """How its brightness changes as the tip approaches the target."""
 
     smallest: Annotated[PositiveFloat, Unit("m")] = 0.15
     """Smallest radius, in metres."""
@@ -45,7 +46,7 @@ class SphereSettings(Settings):
     """Red, green and blue at full brightness, each 0 to 1."""
 
     opacity: float = Field(default=0.45, gt=0.0, le=1.0)
-    """1 hides what is behind it."""
+    """Opacity; 1 hides everything behind the sphere."""
 
     def reveals(self) -> tuple[Within, ...]:
         if self._is_constant:

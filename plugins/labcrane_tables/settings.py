@@ -10,14 +10,14 @@ class TableSettings(Settings):
 
     streams: Literal["parquet", "csv", "both", "none"] = "parquet"
     """How streams, one row per tick, are written. Parquet is small and fast; R reads it with the
-    package arrow or nanoparquet. CSV, gzipped, is read without any, and takes ten times as long."""
+    package arrow or nanoparquet. Gzipped CSV needs no package, but takes ten times as long."""
 
 
 class ArchiveSettings(Settings):
     """Settings of :class:`~labcrane_tables.archive.Archive`."""
 
     license: str
-    """Licence under which the data are given, by its SPDX name: ``CC-BY-4.0``, ``CC0-1.0``."""
+    """SPDX name of the data's licence: ``CC-BY-4.0``, ``CC0-1.0``."""
 
     authors: tuple[str, ...] = ()
     """Who made the data set."""
@@ -26,8 +26,8 @@ class ArchiveSettings(Settings):
     """What the study is about; its title by default."""
 
     recordings: bool = True
-    """Whether the participant files go in, with every tick; otherwise only tables of trials,
-    answers and scores."""
+    """Whether to include the participant files, with every tick; otherwise the archive contains
+    only tables of trials, answers and scores."""
 
 
 class PsychDsSettings(Settings):

@@ -13,30 +13,28 @@ Code = Annotated[int, Field(ge=1, le=255)]
 
 
 class LineSettings(Settings):
-    """What every line has."""
+    """Settings of every line."""
 
     codes: Annotated[dict[EventName, Code], Field(min_length=1)] | None = None
-    """Code of each event that is sent, 1 to 255; of those in one tick the first in this list goes
-    out at once. All that have a number in docs/markers.md by default, by that number, what is shown
-    or done before what begins or ends, but ``movement.onset`` and ``movement.offset``, which are
-    learnt late."""
+    """Code, 1 to 255, of each event that is sent. Of several events in one tick, the first in this
+    list is sent at once. The default is every event with a number in docs/markers.md, except
+    ``movement.onset`` and ``movement.offset``, which are detected late; events that show or do
+    something come before those that begin or end something."""
 
     pulse_s: NonNegativeFloat = 0.01
-    """How long a code stays on the line, in seconds, at least: it is taken off in a tick. For as
-    long it rests before the next one. 0 leaves that to the device."""
+    """Minimum time for which a code stays on the line, in seconds; it is cleared in a tick. The
+    line rests as long before the next code. With 0, the device clears the line."""
 
     @property
     def spacing_s(self) -> float:
-        """Least time from one code to the next, in seconds."""
+        """Minimum time from one code to the next, in seconds."""
         return 2.0 * self.pulse_s
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
         first: dict[int, str] = {}
         for event, code in (self.codes or {}).items():
             if (other := first.setdefault(code, event)) != event:
-                return {
-                    "codes": f"has {code} for {other} and for {event}, which nobody tells apart"
-                }
+                return {"codes": f"has {code} for both {other} and {event}, which look the same"}
         return {}
 
 
@@ -47,11 +45,10 @@ class SerialSettings(LineSettings):
     """Name of the port: ``/dev/ttyUSB0``, ``COM3``."""
 
     baud: PositiveInt = 115_200
-    """Signs per second, as the device has them."""
+    """Baud rate of the device."""
 
     echo: bool = False
-    """Whether the device sends back what it shows, byte by byte: each echo is recorded with its
-    delay."""
+    """Whether the device echoes each byte that it shows; each echo is recorded with its delay."""
 
     def provides(self, machine: Machine) -> Names:
         return {"port": (self.port,)}
@@ -61,10 +58,10 @@ class BoxSettings(SerialSettings):
     """Settings of a box that takes commands in words."""
 
     command: str = "WRITE {code}\n"
-    """What sets the lines; ``{code}`` stands for the number."""
+    """Command that sets the lines; ``{code}`` is replaced by the code."""
 
     rest: str = "WRITE 0\n"
-    """What clears them when ``pulse_s`` is over."""
+    """Command that clears the lines after ``pulse_s``."""
 
     @field_validator("command")
     @classmethod
@@ -79,7 +76,7 @@ class BoxSettings(SerialSettings):
 
 
 class ParallelSettings(LineSettings):
-    """Settings of a parallel port under Linux. Not tried on a real one."""
+    """Settings of a parallel port under Linux. Not tested with a real port."""
 
     port: Path = Path("/dev/parport0")
     """The port's file: ``modprobe ppdev`` makes it, and the group ``lp`` may open it."""

@@ -42,43 +42,43 @@ class CameraSettings(Settings):
     """Where a camera is, or the joint that it is attached to."""
 
     name: str = "camera"
-    """Names it in the picture and in the areas of interest."""
+    """Name of the camera in the picture and in the areas of interest."""
 
     eye: Annotated[Triple, Unit("m")]
     """Position in metres, in the machine's base frame or in that of the joint it is attached to."""
 
     look: Annotated[Triple, Unit("m")] | Literal["targets"]
-    """A point in the middle of its picture, in the same frame. ``targets`` turns it once, for the
-    whole session, so that its picture holds all of the tasks' targets, the way of the tip between
-    them, and the tip at rest."""
+    """Point in the middle of the picture, in the same frame. ``targets`` orients the camera once
+    for the whole session, so that the picture includes all targets of the tasks, the path of the
+    tip between them, and the tip at rest."""
 
     fov_deg: float = Field(default=70.0, gt=1.0, lt=170.0)
-    """Horizontal field of view, in degrees; with ``look: targets`` as wide as it must be."""
+    """Horizontal field of view, in degrees; with ``look: targets``, it is computed."""
 
     on: LinkName | None = None
-    """Joint behind whose link it rides; it stands in the scene by default."""
+    """Joint to whose link the camera is attached; by default the camera is fixed in the scene."""
 
     shows: Literal["colour", "depth"] = "colour"
-    """``depth`` shows how far away what is solid is: white at the near end of ``depth_m``, black at
+    """``depth`` shows the distance of solid objects: white at the near end of ``depth_m``, black at
     the far end and beyond."""
 
     depth_m: tuple[PositiveFloat, PositiveFloat] = (0.5, 20.0)
     """Near and far end of a depth picture, in metres along the line of sight."""
 
     cab_frame: bool = False
-    """Whether it looks out of a cab: pillars, the edge of the roof and a sill hide what is behind
-    them, and stay where they are in the picture. Areas of interest are not cut by them."""
+    """Whether the camera looks out of a cab: pillars, the edge of the roof and a sill hide what is
+    behind them, and keep their place in the picture. They do not crop areas of interest."""
 
     rate_hz: Annotated[PositiveFloat | None, Usual(1.0, 500.0)] = None
     """Pictures per second of the session's time; as many as the window shows by default."""
 
     delay_s: Annotated[NonNegativeFloat, Usual(0.001, 5.0)] = 0.0
-    """How long ago what it shows happened, in seconds, beside the window's own delay."""
+    """Delay of the camera's picture, in seconds, in addition to the window's delay."""
 
     @model_validator(mode="after")
     def _depth_rises(self, info: ValidationInfo) -> "CameraSettings":
         if self.look == self.eye and not was_run(info):
-            raise WrongKey("look is where its eye is; write a point that it looks at", at=("look",))
+            raise WrongKey("look and eye are the same point; write another look", at=("look",))
         if self.look == "targets" and self.on is not None:
             raise WrongKey(
                 f"a camera attached to {self.on!r} cannot keep the targets in its picture; write "
@@ -101,7 +101,7 @@ CAMERAS: Mapping[str, CameraSettings] = {
     "free": CameraSettings(name="free", eye=(11.0, -9.5, 5.5), look=(3.5, 0.0, 1.2), fov_deg=60),
     "top": CameraSettings(name="top", eye=(4.5, 0.0, 15.0), look=(4.6, 0.0, 0.0), fov_deg=75),
 }
-"""Cameras that have a name."""
+"""Predefined cameras."""
 
 
 Camera = Annotated[CameraSettings, Preset("camera", CAMERAS)]
@@ -132,7 +132,7 @@ OTHER_FONTS = (b"ttcf", b"wOFF", b"\x80\x01", b"%!", b"MZ")
 
 
 def _is_file(path: Path) -> bool:
-    return os.path.isfile(path)  # noqa: PTH113 - a name that no disk takes is none, and no error
+    return os.path.isfile(path)  # noqa: PTH113 - an impossible name is not an error here
 
 
 def _no_font(path: Path) -> str:
@@ -152,27 +152,27 @@ def _no_font(path: Path) -> str:
 
 
 ENTERING = ("target.entered",)
-"""Events that tell whether the tip is where it should be."""
+"""Events that reveal whether the tip is in the target."""
 
 
 class PatchSettings(Settings):
     """A square in a corner for a photodiode: it changes between black and white."""
 
     on: Annotated[tuple[EventName, ...], Field(min_length=1), Once()] = ("trial.start", "trial.end")
-    """Events at each of which it changes."""
+    """Events at which the square changes."""
 
     corner: Literal["bottom_left", "bottom_right", "top_left", "top_right"] = "bottom_left"
-    """Where it is."""
+    """Corner of the picture."""
 
     size: Pixels = 60
     """Edge length, in pixels."""
 
 
 GAZE_MARKER_CELLS = 10
-"""Along an edge of a gaze marker: white margin, black frame, six bits, frame, margin."""
+"""Number of cells along an edge of a marker: white margin, black frame, six bits, frame, margin."""
 
 GAZE_MARKER_CODES = 16
-"""Codes that there are: four for each of four monitors."""
+"""Number of codes: four for each of four monitors."""
 
 
 class GazeMarkerSettings(Settings):
@@ -180,7 +180,7 @@ class GazeMarkerSettings(Settings):
 
     first: Annotated[NonNegativeInt, Field(lt=GAZE_MARKER_CODES)] = 0
     """Number of the first marker, in the upper left corner; the others follow clockwise, then those
-    of the next monitor. A second window needs numbers of its own."""
+    of the next monitor. A second window needs different numbers."""
 
     size: Annotated[Pixels, Field(multiple_of=GAZE_MARKER_CELLS)] = 100
     """Edge length with the white margin, in pixels: ten cells of whole pixels."""
@@ -260,15 +260,15 @@ class ViewSettings(Settings):
     """How long a hint is shown, in seconds."""
 
     language: Literal["en", "de", "pl"] = "en"
-    """Of that text."""
+    """Language of the text in the view."""
 
     font: StudyPath | None = None
-    """Font file for the text, beside the protocol; DejaVu Sans by default, whose digits are as
+    """Font file for the text, in the protocol's folder; DejaVu Sans by default, whose digits are as
     high as capitals."""
 
     text_arcmin: PositiveFloat | None = None
-    """Height of capitals and digits on the retina, in minutes of arc (ISO 9241-303 asks for 16 at
-    least, and recommends 20 to 22); a fixed share of the window's height by default."""
+    """Height of capitals and digits as a visual angle, in minutes of arc (ISO 9241-303 requires at
+    least 16, and recommends 20 to 22); a fixed share of the window's height by default."""
 
     viewing_m: Annotated[PositiveFloat, Unit("m")] | None = None
     """Distance from the eye to the screen, in metres; ``text_arcmin`` needs it."""
@@ -277,16 +277,16 @@ class ViewSettings(Settings):
     """Whether targets are drawn."""
 
     depth_cues: tuple[DepthCue, ...] = ()
-    """What tells how high the tip is and where it is above the ground: a spot below it, a line down
-    to it, lines on the ground a metre apart. Every group sees them: views have the same settings in
-    all of them."""
+    """Cues for the height of the tip and its place above the ground: a spot below it, a line down
+    to the ground, a grid of lines on the ground, one metre apart. Every group sees them, because a
+    view has the same settings in all groups."""
 
     daylight: Time = "day"
-    """``day``, ``evening`` with a low sun and long shadows, ``overcast`` with hardly any, or
-    ``dusk``: contrast and haze are those of the time of day."""
+    """``day``, ``evening`` with a low sun and long shadows, ``overcast`` with faint shadows, or
+    ``dusk``. Contrast and haze follow the time of day."""
 
     delay_s: Annotated[NonNegativeFloat, Usual(0.001, 5.0)] = 0.0
-    """How long ago what is shown happened: a teleoperator's delay, in seconds."""
+    """Delay of the picture, in seconds, as in teleoperation."""
 
     rate_hz: Annotated[PositiveFloat | None, Usual(1.0, 500.0)] = None
     """Maximum of pictures per second; the monitor's refresh rate by default."""
@@ -306,22 +306,22 @@ class ViewSettings(Settings):
     default."""
 
     areas: Annotated[tuple[SceneObject, ...], Once()] = ("tip", "target", "other", "sphere")
-    """What has a box for eye tracking: tip, targets, shapes of cues; links, the grapple and things
-    by name, around what is drawn of them, wherever it moves."""
+    """Objects whose bounding boxes are recorded for eye tracking: tip, targets, shapes of cues;
+    links, the grapple and things by name. Boxes follow the drawn objects."""
 
     quality: Literal["low", "medium", "high", "auto"] = "medium"
-    """``low`` is without shadows, ``medium`` has hard ones, ``high`` soft ones and smooth edges
-    (four samples a pixel). ``auto`` measures when the window opens, and takes the best that leaves
-    time for 40 pictures a second, or ``low``; the record says which."""
+    """``low`` draws no shadows, ``medium`` hard shadows, ``high`` soft shadows and smooth edges
+    (four samples per pixel). ``auto`` measures when the window opens, and uses the best quality
+    that allows 40 pictures a second, or ``low``; the record states which."""
 
     shadow: Annotated[NonNegativeInt, Field(le=8192)] | None = None
-    """Edge of the shadow maps in pixels; 0 for no shadows, as ``quality`` has it by default."""
+    """Edge of the shadow maps in pixels; 0 for no shadows. ``quality`` sets the default."""
 
     display: Literal["window", "hidden"] = "window"
-    """``hidden`` draws without any screen: for recordings and tests."""
+    """``hidden`` draws without a screen, for recordings and tests."""
 
     renderer: Literal["auto", "software"] = "auto"
-    """``software`` draws without any graphics driver, and without shadows."""
+    """``software`` draws without a graphics driver, and without shadows."""
 
     @field_validator("font")
     @classmethod

@@ -210,7 +210,7 @@ UNLIKE = [
         ([("  use: joint_velocity\n", "  use: joint_velocity\n  dead_zone: 0.99\n")], "scheme.dead_zone", "moves nothing over most"),
         ([("sessions:", "streams: {g: {name: G, type: Gaze}}\nmonitors: {g: {use: eeg_signal}}\nsessions:")], "monitors.g", "for streams of type EEG"),
         ([("sessions:", "streams: {g: {name: G, min_delay_s: 10}}\nsessions:")], "streams.g.min_delay_s", "2 is very much"),
-        ([("sessions:", "triggers: {a: {use: serial_ttl, port: COM3, codes: {trial.start: 1, trial.end: 1}}}\nsessions:")], "triggers.a.codes", "which nobody tells apart"),
+        ([("sessions:", "triggers: {a: {use: serial_ttl, port: COM3, codes: {trial.start: 1, trial.end: 1}}}\nsessions:")], "triggers.a.codes", "which look the same"),
         ([("sessions:", "triggers: {a: {use: serial_ttl, port: COM3}, b: {use: serial_ttl, port: COM3}}\nsessions:")], "triggers.b", "both write to port COM3"),
         ([("sessions:", "streams: {gaze: {name: Neon, latency_s: 40}}\nsessions:")], "streams.gaze.latency_s", "a latency of 40 s"),
         ([("sessions:", "streams: {g: {name: Neon Gaze}}\nsessions:")], "streams.g.space", "does not say what its pixels are of"),

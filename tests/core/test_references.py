@@ -207,7 +207,7 @@ OWN = (
     ("old", "new", "said"),
     [
         ("use: sphere", "use: sphere, colour: [40, 190, 255]", "feedback.ball.colour[1] is 40; it must be less than or equal to 1"),
-        ("camera: cab}", "camera: {eye: [1, 2, 3], look: [1, 2, 3]}}", "look is where its eye is; write a point"),
+        ("camera: cab}", "camera: {eye: [1, 2, 3], look: [1, 2, 3]}}", "look and eye are the same point; write another"),
         ("camera: cab}", "font: protocol.yaml}", "views.operator.font: 'protocol.yaml' is not a font file;"),
         ("camera: cab}", "patch: {on: []}}", "views.operator.patch.on is []; it needs at least 1"),
         ("camera: cab}", "patch: {on: [trial.end, trial.end]}}", "views.operator.patch.on has 'trial.end' twice; write it once"),
@@ -672,7 +672,7 @@ TRACK = "design:\n  tracks: {t: {factor: pairs, levels: {2m_far_left: 2, 4m_far_
 @pytest.mark.parametrize(
     ("old", "new", "at", "said"),
     [
-        ("camera: cab", "camera: {eye: [1, 2, 3], look: [1, 2, 3]}", "[1, 2, 3]}", "look is where its eye is"),
+        ("camera: cab", "camera: {eye: [1, 2, 3], look: [1, 2, 3]}", "[1, 2, 3]}", "look and eye are the same point"),
         ("camera: cab", "camera: {eye: [1, 2, 3], on: slew, look: targets}", "targets}", "cannot keep the targets"),
         ("camera: cab", "beside: [{eye: [1, 2, 3], look: targets, depth_m: [3, 2]}]", "[3, 2]", "must be farther away"),
         ("design:", QUESTION % "kind: choice" + "design:", "choice}", "has no choices"),

@@ -41,7 +41,7 @@ class JawsSettings(Settings):
     arm's tip is the point between the jaws."""
 
     length_m: PositiveFloat = 0.24
-    """From the hinge to the point between the jaws, in metres."""
+    """Distance from the hinge to the point between the jaws, in metres."""
 
     width_m: PositiveFloat = 0.12
     """Width of a jaw, in metres."""
@@ -50,15 +50,14 @@ class JawsSettings(Settings):
     """Thickness of a jaw, in metres."""
 
     grip_n: PositiveFloat = 60.0
-    """A grip forms when both jaws press with more than this, in newtons."""
+    """Force in newtons above which a grip forms, if both jaws press with more than this."""
 
     release_deg: PositiveFloat = 2.0
-    """A grip is let go when the jaws are opened by this much, in degrees."""
+    """Angle in degrees by which the jaws must open to release a grip."""
 
     squeeze_n: Annotated[NonNegativeFloat, Usual(0.1, 10_000.0)] = 0.0
-    """By how much more each jaw presses on what it holds for every millimetre that it is driven
-    further shut, in newtons, up to what its drive can give; opening lets go. At 0 a grip does not
-    tighten."""
+    """Additional force of each jaw on the held thing, in newtons per millimetre of further closing,
+    up to the maximum of its drive. Opening releases the grip. With 0, a grip does not tighten."""
 
 
 class OverloadSettings(Settings):
@@ -68,17 +67,17 @@ class OverloadSettings(Settings):
     """Load at which an overload begins, as a fraction of the joint's effort."""
 
     release: float = Field(default=0.8, gt=0.0, le=1.0)
-    """Load below which it may end."""
+    """Load below which an overload may end."""
 
     hold_s: NonNegativeFloat = 0.2
-    """How long the load must stay below for it to end, in seconds."""
+    """Time in seconds for which the load must stay below ``release`` for an overload to end."""
 
 
 class ProportionalValveSettings(Settings):
     """The valve of joints that the model does not describe."""
 
     dead_band: Annotated[float, Usual(0.5, 100.0)] = Field(ge=0.0, lt=250.0)
-    """Size of the signal up to which the joint stands still, in steps of 0.4 % of full flow."""
+    """Signal up to which the joint does not move, in steps of 0.4 % of full flow."""
 
     dead_time_s: Annotated[NonNegativeFloat, Usual(0.001, 5.0)]
     """Time before a signal has any effect, in seconds."""
@@ -93,7 +92,7 @@ class ProportionalValveSettings(Settings):
 
 
 class ArmSettings(Settings):
-    """An arm that moves by a Dynamic Model Description."""
+    """An arm that moves according to a Dynamic Model Description."""
 
     model: StudyPath
     """The model's YAML file, made with ``labcrane dmd fit``."""
@@ -113,15 +112,15 @@ class ArmSettings(Settings):
     """The jaws, if the arm has any."""
 
     overload: OverloadSettings = OverloadSettings()
-    """Under which load, and until when, a joint of this arm is overloaded."""
+    """Load at which an overload of a joint begins, and conditions for its end."""
 
     window_s: PositiveFloat = 0.05
-    """Force is the contact impulse over this time divided by it, and load its mean, in seconds."""
+    """Averaging time of contact forces and loads, in seconds."""
 
     @model_validator(mode="before")
     @classmethod
     def _former(cls, written: object, info: ValidationInfo) -> object:
-        # What was recorded without this key had no valve there.
+        # Recordings without this key had no valve for these joints.
         if was_run(info) and isinstance(written, Mapping):
             none = {"dead_band": 0.0, "dead_time_s": 0.0, "lag_s": 0.0}
             return {"proportional_valve": none, **written}
