@@ -27,8 +27,8 @@ RUNNING = Phase.RUNNING  # Python 3.11 takes long to find it there in every tick
 class Aiming(Task):
     """Two circles at a time; each movement goes from one to the other and is one trial.
 
-    A pair of circles begins with an approach to its near circle, which is recorded and not
-    counted. The machine goes on from where it stands.
+    A pair of circles begins with an approach to its near circle, which is recorded but not counted.
+    The machine continues from its present pose.
     """
 
     signals = (
@@ -42,8 +42,8 @@ class Aiming(Task):
             "reaction_time",
             "s",
             definition=(
-                "from the trial's start to the first stick beyond its dead zone, once all were "
-                "within it: a stick that is still held from before answers nothing"
+                "from the trial's start to the first stick beyond its dead zone, after all sticks "
+                "were within it: a stick held since before the trial is not a response"
             ),
         ),
         Signal("command_onset", "s", definition="from the trial's start to the first command"),
@@ -52,22 +52,22 @@ class Aiming(Task):
             "onset_speed",
             "m/s",
             definition=(
-                "speed of the tip by which the onset was found; recordings without it have their "
-                "onset by a former rule"
+                "tip speed that defined the onset; in recordings without it, an earlier rule "
+                "defined the onset"
             ),
         ),
         Signal(
             "onset_hold",
             "s",
-            definition="how long the tip had to be faster than onset_speed for an onset",
+            definition="time for which the tip had to exceed onset_speed for an onset",
         ),
         Signal(
             "movement_time",
             "s",
             definition=(
                 "from the machine's onset to the offset: the tap, or the beginning of the rest "
-                "that ended the movement; without reaction time. Dreger et al. mean "
-                "circle_to_circle by movement time"
+                "that ended the movement; without reaction time. Movement time in Dreger et al. is "
+                "circle_to_circle"
             ),
         ),
         Signal(
@@ -78,33 +78,31 @@ class Aiming(Task):
             ),
         ),
         Signal(
-            "at_rest", "s", definition="how long that rest was when the trial ended; 0 while moving"
+            "at_rest", "s", definition="duration of that rest at the trial's end; 0 while moving"
         ),
         Signal(
             "circle_to_circle",
             "s",
             definition=(
-                "from the end of the movement before, the trial's start, to the offset, with "
-                "reaction time and dwell: the movement time of Dreger et al.; NaN without an "
+                "from the end of the previous movement, which is the trial's start, to the offset, "
+                "with reaction time and dwell: the movement time of Dreger et al.; NaN without an "
                 "onset"
             ),
         ),
+        Signal("between_circles", "s", definition="from leaving one circle to entering the other"),
         Signal(
-            "between_circles", "s", definition="from leaving the one circle to entering the other"
+            "first_entry", "s", definition="from the trial's start to the first entry of the circle"
         ),
-        Signal(
-            "first_entry", "s", definition="from the trial's start to the first time in the circle"
-        ),
-        Signal("entries", "1", definition="times that the tip came into the circle"),
+        Signal("entries", "1", definition="number of times that the tip entered the circle"),
         Signal(
             "error", "m", definition="distance of the tip from the circle's centre at the offset"
         ),
-        Signal("error_along", "m", definition="error along the task axis, positive for too far"),
+        Signal("error_along", "m", definition="error along the task axis, positive for overshoot"),
         Signal("error_across", "m", definition="error across the task axis"),
         Signal(
             "error_bound",
             "m",
-            definition="largest error that the end rule allows; NaN where it allows any",
+            definition="largest error that the end rule allows; NaN without a limit",
         ),
         Signal("path_length", "m", definition="length of the tip's path from onset to offset"),
         Signal("peak_speed", "m/s", definition="largest speed of the tip in the trial"),

@@ -128,7 +128,7 @@ class AimedMovement:
     def go_on(
         self, elapsed: FloatArray, due: FloatArray, tip: FloatArray, velocity: FloatArray
     ) -> None:
-        """Take many ticks, as :meth:`see` takes one; who calls knows entries, rests, what is fast.
+        """Add many ticks, as :meth:`see` adds one; the caller tracks entries, rests and speeds.
 
         Parameters
         ----------
@@ -172,10 +172,11 @@ class AimedMovement:
         return int(np.searchsorted(self.elapsed, elapsed - ROUNDING_S))
 
     def measures(self, end: int | None) -> dict[str, Value]:
-        """Return the results, ``end`` being the tick of the movement's offset.
+        """Return the results; ``end`` is the tick of the movement's offset.
 
-        Without an offset (a time-out) the errors are those of the last tick, and the times that
-        end with it are NaN. They are also without an onset: nobody made a movement then.
+        Without an offset (a time-out), the errors are those of the last tick, and the times that
+        end with the offset are NaN. They are also NaN without an onset, because there was no
+        movement.
         """
         settings = self.settings
         last = len(self.elapsed) - 1 if end is None else end

@@ -1,7 +1,7 @@
-"""BrainVision files: a header, markers, and samples that are written a piece at a time.
+"""BrainVision files: a header, markers, and samples that are written in chunks.
 
 *BrainVision Core Data Format 1.0* (Brain Products, 2019). Numbers are float32, little-endian, one
-sample of all channels after another; microvolts are written as they are.
+sample of all channels after another; microvolts are written unchanged.
 """
 
 from collections.abc import Iterable, Sequence
@@ -26,9 +26,9 @@ def write_brainvision(
     Parameters
     ----------
     path
-        Of the files, without an ending.
+        Path of the files, without an extension.
     pieces
-        Samples, shape ``(n, n_channels)``, one piece after another.
+        Samples in chunks, each of shape ``(n, n_channels)``.
     channels
         Name and unit of each.
     markers

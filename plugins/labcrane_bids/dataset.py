@@ -51,7 +51,7 @@ def describe_dataset(
     write_json(folder / "dataset_description.json", description)
     dates = "moved to 1925 for each participant" if settings.shift_dates else "as recorded"
     without = (
-        f" Not here, since BIDS has no place for streams of texts or without a rate: "
+        f" Not included, because BIDS has no place for streams of texts or without a rate: "
         f"{', '.join(left_out)}; they are in the participant files and in labcrane's XDF export."
         if left_out
         else ""
@@ -60,8 +60,8 @@ def describe_dataset(
         f"{title}\n\nWritten by labcrane. Motion holds the simulated machine (tracksys-crane) and "
         "the operator's sticks; times are seconds from the first tick of the session, which is the "
         f"acq_time of the scans file. Dates are {dates}. Participants of the status simulated are "
-        "no people. Events are named alike everywhere (trial_type), with HED tags in their "
-        f"description; in eeg they are at the sample that was taken when they happened.{without}\n",
+        "not people. Events have the same names everywhere (trial_type), with HED tags in their "
+        f"description; in eeg they are at the sample taken at the same time.{without}\n",
         encoding="utf-8",
     )
 

@@ -1,4 +1,4 @@
-"""EEG: each stream of that type as BrainVision files, with channels and events beside them."""
+"""EEG: each stream of that type as BrainVision files, with tables of channels and events."""
 
 from collections.abc import Mapping
 from pathlib import Path

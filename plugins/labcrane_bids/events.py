@@ -40,14 +40,14 @@ WHOLE = ("trial", "attempt", "block", "practice", "counted", "void", FAILED, REP
 
 
 def event_table(session: SessionRecord) -> "pd.DataFrame":
-    """Return the events: onset, duration, trial_type, label, and what trial they are of.
+    """Return the events: onset, duration, trial_type, label, and their trial.
 
-    ``trial_type`` is the event's plain name and ``label`` says block and condition too. A trial's
-    start lasts until its end, which is not known of one whose process died; everything else is a
-    moment. ``presentation_failed`` is n/a of what is in no row of the trial table, and where
-    nothing was to be shown. ``response_time`` is the reaction time: from the trial's start to the
-    first stick beyond its dead zone. Annotations that were added after
-    the recording have the type ``annotation`` and their text.
+    ``trial_type`` is the event's plain name; ``label`` also contains block and condition. A trial's
+    start lasts until the trial's end, which is unknown if the process died; all other events are
+    momentary. ``presentation_failed`` is n/a for events outside the trial table, and if nothing was
+    to be shown. ``response_time`` is the reaction time: from the trial's start to the first stick
+    beyond its dead zone. Annotations that were added after the recording have the type
+    ``annotation`` and their text.
     """
     import pandas as pd
 
@@ -99,9 +99,9 @@ def _by_todays_rule(ended: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def screen_of(session: SessionRecord) -> dict[str, Any]:
-    """Return what is known of the operator's picture, as BIDS has it; n/a would be no screen.
+    """Return the known properties of the operator's picture in BIDS form; n/a means no screen.
 
-    Its window stands for the screen: places of gaze are in its pixels, from its upper left corner.
+    The window represents the screen: gaze is in its pixels, from its upper left corner.
     """
     glass = glass_of(session)
     if glass is None:
@@ -132,7 +132,7 @@ def event_description(
         **(marked if MARK in table else {}),
         "onset": {"Description": "from the first sample of motion", "Units": "s"},
         "duration": {
-            "Description": "of a trial, n/a where its end is not known; 0 for a moment",
+            "Description": "of a trial; n/a if its end is unknown; 0 for a momentary event",
             "Units": "s",
         },
         "trial_type": {**types, "HED": hed},
@@ -142,17 +142,20 @@ def event_description(
             "Units": "s",
         },
         "trial": {"Description": "number of the trial in the session"},
-        "attempt": {"Description": "counts from 1; more when the trial was repeated"},
+        "attempt": {
+            "Description": "number of the attempt, from 1; above 1 if the trial was repeated"
+        },
         "block": {"Description": "number of the block in the session"},
-        "practice": {"Description": "1 in a trial of practice"},
-        "counted": {"Description": "1 in a trial that is a result; 0 on the way to one"},
-        "void": {"Description": "1 in an attempt that was broken off, or made again later"},
+        "practice": {"Description": "1 in a practice trial"},
+        "counted": {"Description": "1 in a trial that is analysed; 0 in an approach movement"},
+        "void": {"Description": "1 in an attempt that was aborted, or repeated later"},
         FAILED: {"Description": PRESENTED[FAILED][1]},
         "outcome": {"Description": "how the trial ended"},
         "pair": {"Description": "pair of targets"},
         "direction": {"Description": "away from the machine's base, or towards it"},
         REPEAT: {
-            "Description": "counts events of one name at one moment from 2; n/a for the first",
+            "Description": "number among events with the same name and time, from 2; n/a for the "
+            "first",
             "HED": "Parameter-value/#",
         },
         "StimulusPresentation": {

@@ -37,7 +37,7 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def write_tsv(path: Path, table: "pd.DataFrame") -> None:
-    """Write a table with its header; what is missing is n/a."""
+    """Write a table with its header; missing values are n/a."""
     text = table.to_csv(sep="\t", index=False, na_rep=MISSING, lineterminator="\n")
     path.write_text(text, encoding="utf-8")
 
@@ -48,7 +48,7 @@ def write_bare_tsv(path: Path, pieces: Iterable[Sequence[FloatArray]]) -> None:
     Parameters
     ----------
     pieces
-        Columns of some rows, one piece after another: nothing longer need be in memory.
+        Columns of some rows, in chunks, so that memory stays small.
     """
     with path.open("wb") as file:
         if path.suffix != ".gz":

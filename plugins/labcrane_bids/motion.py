@@ -26,7 +26,7 @@ class TrackingSystem:
     label
         Value of the entity ``tracksys``.
     description
-        What it is.
+        Description of the device.
     channels
         One row per column of its samples: name, component, type, tracked_point, units.
     count
@@ -45,7 +45,7 @@ class TrackingSystem:
     _every: int
 
     def samples(self) -> Iterator[list[FloatArray]]:
-        """Yield the samples' columns, a piece at a time; the first is seconds from sample 0."""
+        """Yield the samples' columns in chunks; the first column is seconds from sample 0."""
         stream, (zero,) = self._stream, self._stream.column("time", 0, 1)
         ticks = ROWS - ROWS % self._every or self._every  # so that each piece begins with a sample
         for at in range(0, len(stream), ticks):

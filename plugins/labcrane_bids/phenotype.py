@@ -120,7 +120,7 @@ class Phenotype:
 
 
 def label_of(name: str) -> str:
-    """Return what the table of a questionnaire is called."""
+    """Return the name of a questionnaire's table."""
     return "_".join(filter(None, map(label, name.split("_"))))
 
 
@@ -201,7 +201,7 @@ def demographics_of(answers: "pd.DataFrame") -> dict[str, str]:
 
 
 def age_code(years: float) -> str:
-    """Return an age as BIDS writes it, which tells no age from ``OLDEST`` on."""
+    """Return an age as BIDS writes it; ages from ``OLDEST`` share one code."""
     return f"{years:g}" if years < OLDEST else f"{OLDEST}+"
 
 

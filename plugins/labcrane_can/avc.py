@@ -1,8 +1,7 @@
-"""Auxiliary valve messages of ISO 11783-7, decoded and made by hand.
+"""Auxiliary valve messages of ISO 11783-7: encoding and decoding.
 
-A command (PGN 0xFE30 and the valve's number) has the port flow in its first byte, 0 to 250 in steps
-of 0.4 %, and in its third what the valve is to do with it. The sign of a signal is there, not in
-the flow.
+A command (PGN 0xFE30 plus the valve's number) has the port flow in its first byte, 0 to 250 in
+steps of 0.4 %. The third byte contains the valve's state, and thus the sign of the signal.
 """
 
 from dataclasses import dataclass
@@ -16,11 +15,11 @@ FULL = 250
 LENGTH = 8
 NOT_AVAILABLE, ERROR = 0xFF, 0xFE
 FLOW_OFFSET = 125
-"""What is added to a flow in percent when it is sent back."""
+"""Offset that is added to a flow in percent when it is sent back."""
 
 
 class State(IntEnum):
-    """What a valve is told to do; what is not here is reserved."""
+    """The commanded state of a valve; all other values are reserved."""
 
     BLOCK = 0
     EXTEND = 1

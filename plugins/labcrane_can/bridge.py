@@ -21,10 +21,10 @@ FLOW = "gateway.flow"
 
 
 class Bridge:
-    """Pushes what the panel asks, and sends the valves' flow back to it.
+    """Push the panel's commands to LSL, and send the valves' flow back to the panel.
 
-    While the panel is silent, or one of its open valves is, nothing is pushed: the other end shuts
-    the valves by itself.
+    While the panel, or one of its open valves, is silent, nothing is pushed: the other end then
+    shuts the valves by itself.
     """
 
     def __init__(self, settings: CanSettings, name: str) -> None:

@@ -1,4 +1,4 @@
-"""Command state: what a panel last asked of each joint."""
+"""Command state: a panel's last command for each joint."""
 
 import math
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ NODE, PRIORITY_SHIFT = 0xFF, 26
 
 
 class CanFrame(Protocol):
-    """As much of python-can's message as is read."""
+    """The attributes of python-can's message that are read."""
 
     arbitration_id: int
     is_extended_id: bool
@@ -28,8 +28,8 @@ class CanFrame(Protocol):
 class Asked:
     """A joint's last command: its signal, whether the valve is to float, and when it came.
 
-    ``wrong`` says what came in its place since, in words: a panel that sends no number is broken,
-    and what it asked before counts no more.
+    ``wrong`` describes an invalid value that came since: a panel that sends values other than
+    numbers is broken, and its earlier command expires.
     """
 
     signal: float = 0.0
@@ -39,7 +39,7 @@ class Asked:
 
 
 class PanelCommands:
-    """Takes frames, and keeps the last command of every joint.
+    """Read frames, and keep the last command of every joint.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class PanelCommands:
         not a number: it is reported at once.
         """
         if wrong := [asked.wrong for asked in self.asked.values() if asked.wrong]:
-            return f"{'; '.join(wrong)}; see what is wrong with the panel"
+            return f"{'; '.join(wrong)}; check the panel"
         fallen = [
             f"{joint} at {asked.signal:g}"
             for joint, asked in self.asked.items()

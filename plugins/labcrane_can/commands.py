@@ -28,7 +28,7 @@ def can(
     neutral: Annotated[
         float, typer.Option(help="value of a DBC signal at rest, where the valve is shut")
     ] = 0.0,
-    full: Annotated[float, typer.Option(help="value of a DBC signal that is full flow")] = 100.0,
+    full: Annotated[float, typer.Option(help="value of a DBC signal at full flow")] = 100.0,
     bitrate: Annotated[int, typer.Option(help="bits per second")] = 250_000,
     name: Annotated[str, typer.Option(help="name of the command stream")] = "gateway.command",
     seconds: Annotated[float | None, typer.Option(help="stop after this time")] = None,

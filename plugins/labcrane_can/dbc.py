@@ -58,13 +58,13 @@ def every_signal(path: Path) -> tuple[str, ...]:
 
 
 def check_ranges(settings: ValveMap) -> None:
-    """Refuse signals that the DBC file has on one side of ``neutral`` only.
+    """Reject signals whose range in the DBC file is on one side of ``neutral`` only.
 
     Raises
     ------
     ProtocolError
-        A lever that counts from 0 to 100 rests at 50: with ``neutral: 0`` it would ask for half of
-        full flow when nobody touches it.
+        The range is on one side: a lever from 0 to 100 rests at 50, and with ``neutral: 0`` it
+        would command half of full flow at rest.
     """
     for name, signal in _used(settings):
         least, most = signal.minimum, signal.maximum
@@ -137,10 +137,10 @@ def key_of(identifier: int, *, extended: bool) -> FrameKey:
 
 
 def of_any_source(identifier: int) -> FrameKey:
-    """Return the key of frames with this extended identifier whatever source and priority it has.
+    """Return the key of frames with this extended identifier, for any source and priority.
 
-    J1939 tells messages by their parameter group. A DBC file of it has the null address as source,
-    which no device sends with.
+    J1939 identifies messages by their parameter group. Its DBC files have the null address as
+    source, with which no device sends.
     """
     return "group", identifier & GROUP
 

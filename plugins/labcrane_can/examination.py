@@ -41,7 +41,7 @@ def _traffic(settings: CanSettings, sources: Counter[int], seconds: float) -> Fi
     nodes = ", ".join(f"0x{node:02X}" for node in sorted(sources))
     text = f"{settings.bus}: {rate:.0f} frames a second"
     if rate > settings.most_frames_s:
-        return Finding(Verdict.FAIL, f"{text} from {nodes}", "find out who floods the bus")
+        return Finding(Verdict.FAIL, f"{text} from {nodes}", "find the device that floods the bus")
     if not sources:
         fix = f"switch the panel on; check its plug, the terminators and bitrate {settings.bitrate}"
         return Finding(Verdict.FAIL, f"{settings.bus} is open and silent", fix)

@@ -1,4 +1,4 @@
-"""A thread beside the loop that reads a bus, and opens it again when it was unplugged."""
+"""A thread that reads a bus independently of the loop, and reopens it after a disconnection."""
 
 import contextlib
 import socket
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     import can
 
 WAIT_S = 0.02
-"""How long one look at the bus may take; what waits to be sent waits as long."""
+"""Maximum duration of one read from the bus; outgoing frames wait as long."""
 
 DIAL_AFTER_S, DIAL_S = 1.0, 0.5
-"""Silence after which a socketcand server is dialled again, and how long that may take."""
+"""Silence after which a socketcand server is connected again, and the limit for connecting."""
 
 MOST_GARBLED = 20
 """Number of consecutive lines that are not frames, after which the bus is opened again."""
@@ -28,7 +28,7 @@ AGAIN_S = 0.2
 
 
 class Listener:
-    """Reads frames into a panel's commands, and sends what is given.
+    """Read frames into a panel's commands, and send frames.
 
     Attributes
     ----------

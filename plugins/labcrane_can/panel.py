@@ -15,9 +15,9 @@ PERCENT = 100.0
 
 
 class CanPanel(InputDevice):
-    """Reads the newest command of every valve; old ones shut it.
+    """Reads the newest command of every valve; an expired command shuts the valve.
 
-    A thread takes the frames, so that a slow adapter never makes the loop wait.
+    A thread reads the frames, so that a slow adapter never delays the loop.
     """
 
     def __init__(self, settings: CanSettings, machine: Machine) -> None:

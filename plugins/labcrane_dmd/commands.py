@@ -48,7 +48,7 @@ def fit(
         str | None, typer.Option(help="signals of the layers: 40,80,120; the paper's by default")
     ] = None,
     validation: Annotated[
-        str | None, typer.Option(help="signals that the fit never looks at: 20,60,100")
+        str | None, typer.Option(help="signals that the fit does not use: 20,60,100")
     ] = None,
     edge: Annotated[
         str | None,
@@ -228,10 +228,10 @@ def plot(
     ] = None,
     recordings: Annotated[
         Path | None,
-        typer.Option(help="recordings that it was fitted to: their angles and speeds, too"),
+        typer.Option(help="recordings of the fit, to plot their angles and speeds, too"),
     ] = None,
 ) -> None:
-    """Draw a model's layers, and on request the angles and speeds that they come from."""
+    """Plot a model's layers, and optionally the recorded angles and speeds."""
     from labcrane_dmd.fit.figures import draw_angles, draw_model, draw_speeds
     from labcrane_dmd.fit.recordings import read_recordings
     from labcrane_dmd.model.model_file import load
@@ -250,7 +250,7 @@ def plot(
 
 
 def record(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="where recordings are kept")],
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="folder for the recordings")],
     segment: Annotated[str, typer.Option(help="the joint that is recorded")],
     signal: Annotated[
         str,
@@ -268,14 +268,14 @@ def record(
     *,
     lsl: Annotated[bool, typer.Option("--lsl", help="streams of Lab Streaming Layer")] = False,
     map_: Annotated[
-        Path | None, typer.Option("--map", help="DBC file of what is on the bus or in the log")
+        Path | None, typer.Option("--map", help="DBC file of the messages on the bus or in the log")
     ] = None,
     neutral: Annotated[float, typer.Option(help="value of a DBC signal at rest")] = 0.0,
-    full: Annotated[float, typer.Option(help="value of a DBC signal that is full flow")] = 100.0,
+    full: Annotated[float, typer.Option(help="value of a DBC signal at full flow")] = 100.0,
     bitrate: Annotated[int, typer.Option(help="bits per second of the bus")] = 250_000,
     seconds: Annotated[float | None, typer.Option(help="stop after this time")] = None,
 ) -> None:
-    """Record a joint's steps for ``dmd fit``: from a CAN bus, a log of one, or LSL.
+    """Record joint steps for ``dmd fit``: from a CAN bus, a CAN log, or LSL.
 
     Every value is written to raw/SEGMENT.csv as it arrives. At the end, or after Ctrl-C, the values
     are cut into runs: SEGMENT.csv contains the runs; steps/SEGMENT.csv contains every step, and why
@@ -285,7 +285,7 @@ def record(
     from labcrane_dmd.bench.steps import cut, write_runs
 
     if sum((bus is not None, log is not None, lsl)) != 1:
-        raise ProtocolError("say where the values come from: one of --bus, --log and --lsl")
+        raise ProtocolError("name the source of the values: one of --bus, --log and --lsl")
     if (folder / f"{segment}.csv").exists() and (log is None or log.suffix != ".csv"):
         raise ProtocolError(
             f"{folder / f'{segment}.csv'} already exists, and recordings are not overwritten; "
@@ -293,7 +293,7 @@ def record(
         )
     of_can = not lsl and (log is None or log.suffix != ".csv")
     if of_can and (missing := not_installed({"can": LAB, "cantools": LAB})):
-        raise PluginError(f"what is on a CAN bus {missing}")
+        raise PluginError(f"messages of a CAN bus {missing}")
     raw = folder / "raw" / f"{segment}.csv"
     samples: Iterator[Sample]
     if lsl:
@@ -301,7 +301,7 @@ def record(
     elif log is not None and log.suffix == ".csv":
         samples = read_raw(log)
     elif map_ is None:
-        raise ProtocolError("what is on a CAN bus only a DBC file explains; give it with --map")
+        raise ProtocolError("a CAN bus needs a DBC file that describes its messages; add --map")
     else:
         values = CanValues(signal, angle, map_, full, neutral)
         frames = read_log(log, values) if log else read_bus(bus or "", bitrate, values, seconds)

@@ -21,9 +21,9 @@ BETWEEN_LOOKS_S = 0.005
 
 
 def set_up(settings: JoystickSettings, path: Path, say: Say, look: Look) -> None:
-    """List the sticks, take a person through the procedure, and keep what was found in ``path``.
+    """List the sticks, guide a person through the procedure, and store the result in ``path``.
 
-    SDL must have been started. ``look`` is called before each look at the sticks.
+    SDL must have been started. ``look`` is called before each reading of the sticks.
     """
     sticks = attached()
     for stick in sticks:
@@ -43,7 +43,7 @@ def set_up(settings: JoystickSettings, path: Path, say: Say, look: Look) -> None
 
 
 def wait_and_look() -> None:
-    """Wait a little, and take in what the sticks did; one that is unplugged raises DeviceError."""
+    """Wait a little, and process the sticks' events; an unplugged stick raises DeviceError."""
     import pygame  # noqa: PLC0415 - heavy
 
     time.sleep(BETWEEN_LOOKS_S)

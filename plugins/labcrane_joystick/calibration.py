@@ -90,7 +90,7 @@ def default_path() -> Path:
 
 
 def load(path: Path, model: str) -> Calibrations | None:
-    """Return what ``path`` holds for sticks of ``model``; None when there is nothing yet."""
+    """Return the calibrations in ``path`` for sticks of ``model``; None if there are none yet."""
     content = _read(path)
     if model not in content:
         return None
@@ -101,15 +101,15 @@ def load(path: Path, model: str) -> Calibrations | None:
 
 
 def save(path: Path, model: str, found: Calibrations) -> None:
-    """Keep ``found`` in ``path``, and what it holds for other models.
+    """Write ``found`` to ``path``, and keep the calibrations of other models.
 
     Raises
     ------
     DeviceError
-        The file cannot be written, or what it holds cannot be read.
+        The file cannot be written, or its content cannot be read.
     """
     content = {**_read(path), model: found.model_dump()}
-    # Written beside and renamed, so that a crash leaves the old file or the new one.
+    # Written to a temporary file and renamed, so that a crash leaves the old file or the new one.
     beside = path.with_name(path.name + ".new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

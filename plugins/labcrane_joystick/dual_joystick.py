@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 
 
 class DualJoystick(InputDevice):
-    """The two sticks of a model, each axis scaled by its calibration and otherwise untouched.
+    """The two sticks of a model, each axis scaled by its calibration and otherwise unchanged.
 
-    ``x`` is positive to the right, ``y`` towards the operator, as the stick reports them. Dead
-    zone and expo are the scheme's. A stick that is unplugged reads zero, also ``connected``, and
-    is a fault until one of the model is plugged in again, at any socket: it takes the missing
-    side.
+    ``x`` is positive to the right, ``y`` towards the operator, as the stick reports them. The
+    scheme applies dead zone and expo. All values of an unplugged stick are zero, also
+    ``connected``. This is a fault until a stick of the model is plugged in again, at any socket; it
+    replaces the missing side.
     """
 
     signals = tuple(Signal(side, "1", PARTS) for side in SIDES)
@@ -188,7 +188,7 @@ def tell_apart(sticks: Sequence[Stick], stored: Calibrations | None) -> tuple[St
 def _origin(stored: Calibrations | None, path: Path) -> dict[str, Value]:
     if stored is None:
         return {
-            "identified": "not identified: the first stick is taken for the left",
+            "identified": "not identified: the first stick is used as the left one",
             "calibrated": "not calibrated: full range",
         }
     by = f"{stored.date}, {path.name}"

@@ -1,4 +1,4 @@
-"""Stick examination: told apart, centred, moving, and fast enough for a study."""
+"""Stick examination: identified, centred, moving, and fast enough for a study."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -105,7 +105,7 @@ def _identity(sticks: tuple[Stick, Stick], stored: Calibrations | None) -> Findi
     if stored is None:
         return Finding(
             Verdict.WARN,
-            f"two sticks ({sticks[0]}), not told apart: the first is taken for the left",
+            f"two sticks ({sticks[0]}), not identified: the first is used as the left one",
             RUN_AGAIN,
         )
     if not all(stick.has_socket for stick in sticks):
@@ -130,7 +130,7 @@ def _at_rest(hands: Sequence[Hand], look: Look) -> Iterator[Finding]:
     for hand, axes in zip(hands, seen, strict=True):
         for name, values in zip(HANDS, zip(*axes, strict=True), strict=True):
             rest = median(values)
-            text = f"{hand.side} {name} rests at {100 * rest:+.1f} % of its way"
+            text = f"{hand.side} {name} rests at {100 * rest:+.1f} % of its range"
             if abs(rest) > STUCK:
                 fix = "let go of the stick; if it stays there, it is stuck: unplug it or replace it"
                 yield Finding(Verdict.FAIL, text, fix)
@@ -195,11 +195,11 @@ def _rounds(hand: Hand, ask: Prompt, look: Look) -> Iterator[Finding]:
         highest = [max(pair) for pair in zip(highest, axes, strict=True)]
         now = look(POLL_S)
     for name, low, high in list(zip(HANDS, lowest, highest, strict=True))[:2]:
-        text = f"{hand.side} {name} reaches {100 * low:+.0f} to {100 * high:+.0f} % of its way"
+        text = f"{hand.side} {name} reaches {100 * low:+.0f} to {100 * high:+.0f} % of its range"
         if min(-low, high) >= REACHED:
             yield Finding(Verdict.PASS, text)
         else:
-            fix = f"move it to both ends and look again; if it stays so, {RUN_AGAIN}"
+            fix = f"move it to both ends and check again; if it stays so, {RUN_AGAIN}"
             yield Finding(Verdict.FAIL, text, fix)
     rate = changes / (now - began)
     text = f"{hand.side} stick gave {rate:.0f} new values a second while it moved"

@@ -1,4 +1,4 @@
-"""Episodes of a recording: one per attempt that counts, as pairs of what was seen and done."""
+"""Episodes of a recording: one per counted attempt, as pairs of observation and action."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -87,7 +87,7 @@ class EpisodeLayout:
 
 
 def layout_of(session: SessionRecord) -> EpisodeLayout:
-    """Return what the columns of a session's episodes are."""
+    """Return the columns of a session's episodes."""
     units = {
         f"{group}.{name}": unit
         for group in (*SEEN, *DONE)
@@ -185,7 +185,7 @@ ASIDE = {"outcome", "block_name", "group", "feedback"}
 
 
 def _task(title: str, row: Mapping[Any, Any]) -> str:
-    """Return what was to be done: the study's words, and those of the trial's condition."""
+    """Return the description of the task: the study's words, and those of the trial's condition."""
     words = [
         f"{name.replace('_', ' ')} {value}"
         for name, value in row.items()

@@ -1,4 +1,4 @@
-"""LeRobot's data sets, version 3.0: episodes in Parquet, and what is in them in JSON.
+"""LeRobot's data sets, version 3.0: episodes in Parquet, and their description in JSON.
 
 The layout is that of https://huggingface.co/docs/lerobot/lerobot-dataset-v3.
 """
@@ -78,7 +78,7 @@ class _Book:
     def add(
         self, episode: Episode, file: tuple[int, int], seen: "Mapping[str, Histogram]"
     ) -> "dict[str, np.ndarray[Any, Any]]":
-        """Enter an episode and what its pictures are like; return its columns of numbers."""
+        """Add an episode and the statistics of its pictures; return its columns of numbers."""
         count, number = len(episode.action), len(self.episodes)
         task = self.tasks.setdefault(episode.task, len(self.tasks))
         columns: dict[str, np.ndarray[Any, Any]] = {
@@ -199,7 +199,7 @@ def _write_data(folder: Path, number: int, book: _Book, participant: Participant
 def _packed(
     pictures: "Iterator[dict[str, bytes]]",
 ) -> "tuple[dict[str, list[bytes]], dict[str, Histogram]]":
-    """Return an episode's pictures by camera, and what they are like."""
+    """Return an episode's pictures by camera, and their statistics."""
     packed: dict[str, list[bytes]] = {}
     seen: dict[str, Histogram] = {}
     for each in pictures:
@@ -228,7 +228,7 @@ def _table(
 
 
 def _statistics(values: "np.ndarray[Any, Any]") -> dict[str, list[float] | list[int]]:
-    """Return what LeRobot keeps of a column: one number for each of its elements."""
+    """Return LeRobot's statistics of a column: one number for each of its elements."""
     flat = values.reshape(len(values), -1).astype(np.float64)
     found: dict[str, list[float] | list[int]] = {
         "min": flat.min(axis=0).tolist(),

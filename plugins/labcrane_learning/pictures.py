@@ -1,4 +1,4 @@
-"""Pictures beside the rows of episodes, taken of the recorded frames."""
+"""Pictures for the rows of episodes, rendered from the recorded frames."""
 
 from collections.abc import Iterator, Sequence
 from io import BytesIO
@@ -100,7 +100,7 @@ class Histogram:
         self.pictures += 1
 
     def statistics(self, quantiles: dict[str, float]) -> dict[str, Any]:
-        """Return what LeRobot keeps of a camera's pictures, each of shape ``(3, 1, 1)``, 0 to 1."""
+        """Return LeRobot's statistics of a camera's pictures, each ``(3, 1, 1)``, 0 to 1."""
         values = np.arange(256) / 255.0
         share = self.counts / self.counts.sum(axis=1, keepdims=True)
         below = np.cumsum(share, axis=1)

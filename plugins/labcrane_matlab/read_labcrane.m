@@ -10,8 +10,8 @@ function study = read_labcrane(folder)
 %   study.participants(1).name
 %   study.participants(1).sessions{1}.streams.state.data.joint_angle_slew
 %
-% Times are seconds, angles rad, lengths m; units are beside every stream. Where a participant lacks
-% a column that others have, numbers are NaN and texts ''.
+% Times are in s, angles in rad, lengths in m; every stream has its units. If a participant lacks a
+% column that others have, its numbers are NaN and its texts ''.
 
 if nargin < 1
   folder = fileparts(mfilename('fullpath'));

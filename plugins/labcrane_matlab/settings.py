@@ -7,4 +7,4 @@ class MatlabSettings(Settings):
     """Settings of :class:`~labcrane_matlab.matlab.Matlab`."""
 
     streams: bool = True
-    """Whether streams, one row per tick, are written beside movements and events."""
+    """Whether to write streams, with one row per tick, in addition to movements and events."""

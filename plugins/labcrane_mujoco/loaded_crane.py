@@ -11,7 +11,7 @@ from labcrane_mujoco.mujoco_crane import MujocoCrane
 
 
 class LoadedMujocoCrane(LoadedCrane, MujocoCrane):
-    """The engine's crane with what hangs from its tip."""
+    """The engine's crane with a hanging load at its tip."""
 
     def _move(self, speeds: Sequence[float]) -> FloatArray:
         joints = self._joints
@@ -20,7 +20,7 @@ class LoadedMujocoCrane(LoadedCrane, MujocoCrane):
 
 
 class GrappleCrane(LoadedMujocoCrane):
-    """Drives that also bear what a swinging grapple does to the joints."""
+    """Drives that also bear the forces of a swinging grapple on the joints."""
 
     def open(self, run: Run) -> None:
         self._unit: FloatArray = np.zeros((2, len(self._machine.joints) + 2))

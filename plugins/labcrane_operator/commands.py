@@ -14,12 +14,12 @@ out = Console(soft_wrap=True, highlight=False)
 
 def fit(
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="a participant file")],
-    session: Annotated[int, typer.Option(help="which session of it", min=1)] = 1,
+    session: Annotated[int, typer.Option(help="number of the session", min=1)] = 1,
     to: Annotated[
-        Path | None, typer.Option("--out", help="YAML file for a protocol: its part operator")
+        Path | None, typer.Option("--out", help="YAML file for the protocol's key operator")
     ] = None,
 ) -> None:
-    """Fit the simulated operator to a participant's aimed movements, with 95 % intervals."""
+    """Fit the simulated operator to a participant's aimed movements (95 % CIs)."""
     from labcrane_operator.fitted import not_identified, numbers, protocol_part, save
     from labcrane_operator.fitting import fit_operator
     from labcrane_operator.strokes import read_strokes
@@ -35,7 +35,7 @@ def fit(
     for name, estimate in fitted.items():
         table.add_row(name, *numbers(estimate))
     out.print(table)
-    out.print("not told by the recording, left at the default:")
+    out.print("not identifiable from the recording, left at the default:")
     for name, why in not_identified(fitted).items():
         out.print(f"  {name}: {why}", markup=False)
     if to is not None:

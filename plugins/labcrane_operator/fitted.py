@@ -58,7 +58,7 @@ def save(text: str, path: Path) -> None:
 
 
 def protocol_part(fitted: Mapping[str, Estimate], source: str) -> str:
-    """Return YAML for a protocol: the operator with what was fitted, and where it comes from."""
+    """Return YAML for a protocol: the operator with the fitted values, and their source."""
     lines = [f"# Fitted to {source}.", "# What is missing keeps its default.", "operator:"]
     lines.append("  use: simulated_operator")
     for name, estimate in fitted.items():

@@ -14,7 +14,7 @@ FEWEST = 8
 """Strokes from which a curve of four parameters has an interval worth the name."""
 
 LEAST_SPREAD_BIT = 0.5
-"""Spread of difficulties below which slope and intercept cannot be told apart."""
+"""Spread of difficulties below which slope and intercept cannot be distinguished."""
 
 LAPSE_SD, LAPSE_S = 4.0, 0.5
 """A reaction is a lapse when it is later than the median by so many standard deviations of the

@@ -1,4 +1,4 @@
-"""The main stroke of every recorded movement: what the operator's model can be fitted to."""
+"""The main stroke of every recorded movement, to which the operator's model is fitted."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -48,7 +48,7 @@ MOVING, FIXED, GROUND = "moving", "fixed", "ground"
 
 
 class Observation:
-    """Watches one trial's scene, and turns what goes wrong into events.
+    """Observe one trial's scene, and report mistakes as events.
 
     An object's limit also holds for what it is set down with: its support beyond its own weight,
     once for the whole of it, by the limit of its first part. A
@@ -106,18 +106,18 @@ class Observation:
         return found
 
     def see(self, state: FloatArray, due: float) -> Iterator[Event]:
-        """Take a tick; yield what went wrong in it."""
+        """Take a tick; yield its mistakes."""
         yield from self._contacts(state, due)
         yield from self._overloads(state, due)
         yield from self._dropped(state, due)
 
     def end(self, state: FloatArray, due: float) -> Iterator[Event]:
-        """Yield the drop of what still leaves the jaws in the trial's last tick."""
+        """Yield the drop of a thing that leaves the jaws in the trial's last tick."""
         if self._loose:
             yield from self._fallen(state, due)
 
     def _dropped(self, state: FloatArray, due: float) -> Iterator[Event]:
-        """Yield what has left the jaws and fell too far."""
+        """Yield the drop of a thing that left the jaws and fell too far."""
         if not self._grip:
             return
         left = state.item(self._grip["left"])
@@ -158,7 +158,7 @@ class Observation:
                 yield Event(f"contact.{each.kind}", due, {**about, "count": count})
 
     def _pressing_link(self, state: FloatArray) -> str:
-        """Return the link of the machine that presses most on what is fixed."""
+        """Return the link of the machine with the largest force on fixed things."""
         if self._pressing is None:
             return ""
         return self._links[int(state[self._pressing].argmax())]

@@ -21,7 +21,7 @@ NOWHERE = -1.0
 
 
 class Scenario(Task):
-    """One run in a scene is one trial: its goals in their order, and what went wrong on the way.
+    """One run in a scene is one trial: its goals in their order, and the mistakes during the run.
 
     ``target`` is the goal of the moment, ``target.jaws`` how far the jaws are to be open for it
     (-1 when it does not matter), ``target.touch`` whether its thing was touched (1) or is to be (0;

@@ -11,7 +11,7 @@ EVENTS = (
     "goal.reached", "mistakes.too_many", "deformity.reported", "deformity.found", "drop",
     "overload", "contact.object", "contact.body", "scene.placed",
 )  # fmt: skip
-"""What a run tells beside its beginning and end."""
+"""Events of a run other than its beginning and end."""
 
 
 class ScenarioSettings(Settings):

@@ -1,4 +1,4 @@
-"""Compiled schemes: the same arithmetic as the classes beside it, operation by operation.
+"""Compiled schemes: the same arithmetic as the classes of this package, operation by operation.
 
 What a scheme knows lies in one array: numbers of the scheme, then one block for each law.
 """

@@ -35,14 +35,14 @@ stick. A pull draws it in, or lifts it."""
 
 
 def of_joints(machine: Machine, written: Mapping[str, str]) -> tuple[str, ...]:
-    """Return what each axis of a map to joints does, a sentence each."""
+    """Return a sentence for each axis of a map to joints that states its effect."""
     return tuple(
         _said(axis, _joint_goes(machine, joint, _sign(axis))) for joint, axis in written.items()
     )
 
 
 def of_the_tip(written: Mapping[str, str]) -> tuple[str, ...]:
-    """Return what each axis of a map to directions of the tip does, a sentence each."""
+    """Return a sentence for each axis of a map to tip directions that states its effect."""
     return tuple(_said(axis, _tip_goes(way, _sign(axis))) for way, axis in written.items())
 
 

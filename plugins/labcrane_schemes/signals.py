@@ -1,4 +1,4 @@
-"""Signals that every scheme logs each tick beside its command."""
+"""Signals that every scheme logs each tick in addition to its command."""
 
 import numpy as np
 

@@ -39,8 +39,8 @@ WINDOWS = {
 """Number of half-second windows that a fault must last before it is reported."""
 
 ADVICE = {
-    "no values": "sends no numbers: look at the amplifier's program",
-    "wrong unit": "{rms:.3g} µV in the middle of all channels, by the unit that the header states: "
+    "no values": "sends no numbers: check the amplifier's program",
+    "wrong unit": "median of all channels {rms:.3g} µV, in the unit that the header states: "
     "correct the unit or the scale in the amplifier's program",
     "flat line": "does not move: check its cable, and that the channel is switched on",
     "railing": "is held at the converter's limit: check the electrode's contact and the range",
@@ -48,7 +48,7 @@ ADVICE = {
     "and power supplies away",
     "disconnected electrode": "noise of {noise:.1f} µV/√Hz, beyond all other channels: put gel, "
     "press it on, check its cable",
-    "bridged electrode": "is the same as {other}: dry the gel between the two",
+    "bridged electrode": "has the same signal as {other}: remove the gel between the two",
 }
 
 

@@ -39,9 +39,9 @@ LOST = 0.8
 NEED = {"gaze lost": 5, "pupil implausible": 6, "wrong unit": 6}
 
 ADVICE = {
-    "gaze lost": "no gaze for {lost:.0f} % of the last second: look at the headset's fit, and "
+    "gaze lost": "no gaze for {lost:.0f} % of the last second: check the headset's fit, and "
     "calibrate again",
-    "pupil implausible": "{pupil}: calibrate again, and look at the eye camera's picture",
+    "pupil implausible": "{pupil}: calibrate again, and check the eye camera's picture",
     "wrong unit": "{middle:.3g} cannot be in {unit}: correct the unit in the eye tracker's program",
 }
 

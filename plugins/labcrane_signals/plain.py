@@ -20,8 +20,8 @@ MOVED = 20
 """Windows in which a channel must have moved until its standing still is a fault."""
 
 ADVICE = {
-    "no values": "sends no numbers: look at the device's program",
-    "flat line": "does not move any more: check the sensor's cable",
+    "no values": "sends no numbers: check the device's program",
+    "flat line": "no longer changes: check the sensor's cable",
     "railing": "is held at {value:.4g}, a limit of its converter: check the sensor's range",
     "wrong unit": "{value:.4g} is beyond {largest:g}, the most it can measure: correct its unit or "
     "its calibration",

@@ -17,14 +17,14 @@ END = 0.97
 BEYOND = 2.0
 NEED = {"sticks dead": 6, "wrong unit": 6}
 ADVICE = {
-    "sticks dead": "stands at {value:.3f} without the least tremor of a hand: plug it in again, "
+    "sticks dead": "stays at {value:.3f} without any tremor of a hand: plug it in again, "
     "and restart its program",
     "wrong unit": "{value:.3g} where -1 to 1 is stated: correct the scale in its program",
 }
 
 
 class StickMonitor(WindowedMonitor):
-    """Tells sticks that have died away from rest, and a wrong unit.
+    """Detects sticks that failed away from rest, and a wrong unit.
 
     A stick exactly at rest may have been let go. This is not a fault, unless it trembled at rest
     before.

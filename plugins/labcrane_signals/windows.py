@@ -1,4 +1,4 @@
-"""Sliding windows over samples that come in pieces, faults that last, and monitors made of both."""
+"""Sliding windows over samples in chunks, lasting faults, and monitors made of both."""
 
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
@@ -45,18 +45,18 @@ class Windows:
 
 
 class Streak:
-    """Whether something has been so for several windows, for each channel.
+    """Whether a fault has lasted for several windows, for each channel.
 
-    A good window takes bad ones back, so that what flickers is raised late.
+    A good window cancels bad windows, so that an intermittent fault is reported late.
 
     Parameters
     ----------
     need
-        Bad windows until it counts.
+        Number of bad windows after which a fault is reported.
     channels
-        How many there are.
+        Number of channels.
     back
-        Bad windows that a good one takes back: few for what comes and goes with the signal.
+        Bad windows that a good one cancels: few for faults that come and go with the signal.
     """
 
     def __init__(self, need: int, channels: int, back: int = 2) -> None:
@@ -65,7 +65,7 @@ class Streak:
         self.raised: BoolArray = np.zeros(channels, dtype=np.bool_)
 
     def add(self, bad: BoolArray) -> BoolArray:
-        """Take the next window's verdict, shape ``(n_channels,)``; return what is raised now."""
+        """Add the next verdicts, shape ``(n_channels,)``; return the faults reported now."""
         count = np.where(bad, self._count + 1, self._count - self._back)
         self._count = np.clip(count, 0, self._need + 2)
         self.raised = (self._count >= self._need) | (self.raised & (self._count > 0))
@@ -73,7 +73,7 @@ class Streak:
 
 
 class WindowedMonitor(SignalMonitor):
-    """Judges some channels of a stream window by window; a finding stands until the next one."""
+    """Judge some channels of a stream window by window; a finding holds until the next one."""
 
     def watch(self, stream: SignalStream, columns: Sequence[int], need: Mapping[str, int]) -> None:
         """Begin with a stream.

@@ -44,11 +44,11 @@ def tone(settings: SonificationSettings, distance: float, aside: float, inside_s
     Parameters
     ----------
     distance
-        Of tip and target, in metres.
+        Distance between tip and target, in metres.
     aside
-        How far the target is to the left of the tip, in metres.
+        Distance of the target to the left of the tip, in metres.
     inside_s
-        For how long the tip has been inside the target, in seconds; 0 outside.
+        Time that the tip has been inside the target, in seconds; 0 outside.
     """
     near = 1.0 - min(distance / settings.far, 1.0)
     low, high = settings.pitch_hz

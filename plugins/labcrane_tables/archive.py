@@ -32,20 +32,20 @@ README = """\
 | `data/` | one CSV file per participant and session: trials, answers, scores (Psych-DS) |
 {recordings}| `codebook.csv` | unit, meaning and source of every column |
 | `dataset_description.json` | the same for machines (JSON-LD of schema.org, Psych-DS) |
-| `LICENSE`, `CITATION.cff` | under which terms, and how to cite the software |
+| `LICENSE`, `CITATION.cff` | terms of use, and how to cite the software |
 | `{checksums}` | SHA-256 of every file: `sha256sum -c {checksums}` |
 
-Licence: {license}. Participants are called by pseudonyms; no list of names is in this archive.
+Licence: {license}. Participants have pseudonyms; this archive does not contain their names.
 """
 RECORDINGS = "| `recordings/` | one HDF5 file per participant: every tick; its README is inside |\n"
 
 
 class Archive(Exporter):
-    """One zip file that a repository takes, as OSF and Zenodo, and its checksum beside it.
+    """One zip file for a repository such as OSF or Zenodo, and a file with its checksum.
 
-    Nothing is written if anything personal is found in what would go into it: e-mail addresses,
-    telephone numbers, accounts and names of computers. Those that LSL notes with every stream are
-    taken out of the recordings.
+    Nothing is written if the content includes personal data: e-mail addresses, telephone numbers,
+    accounts and names of computers. The computer names that LSL stores with every stream are
+    removed from the recordings.
     """
 
     def __init__(self, settings: ArchiveSettings) -> None:
@@ -67,7 +67,7 @@ class Archive(Exporter):
         beside.write_text(f"{digest}  {archive.name}\n", encoding="utf-8")
 
     def _fill(self, participants: Iterable[Participant], folder: Path) -> str:
-        """Put everything into a folder; return what the study is called."""
+        """Put everything into a folder; return the name of the study."""
         import pandas as pd
 
         books: list[pd.DataFrame] = []
@@ -113,7 +113,7 @@ class Archive(Exporter):
         )
         (folder / "README.md").write_text(readme, encoding="utf-8")
         licence = (
-            f"The data are given under {self._settings.license}:\n"
+            f"The data are licensed under {self._settings.license}:\n"
             f"https://spdx.org/licenses/{self._settings.license}.html\n"
         )
         (folder / "LICENSE").write_text(licence, encoding="utf-8")
@@ -162,7 +162,7 @@ def _refuse_personal(folder: Path) -> None:
     if found:
         more = f"; and {len(found) - MOST} more" if len(found) > MOST else ""
         raise ProtocolError(
-            f"the archive would hold what could lead to a person: {'; '.join(found[:MOST])}{more}; "
+            f"the archive would contain personal data: {'; '.join(found[:MOST])}{more}; "
             "leave the participant files out with --set recordings=false, or the person with "
             "labcrane exclude"
         )

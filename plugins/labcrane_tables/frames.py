@@ -16,16 +16,16 @@ ROWS = 1 << 16
 
 @dataclass(frozen=True)
 class StreamTable:
-    """A table of one row per sample that has not been read yet.
+    """A table with one row per sample, which is read in batches.
 
     Attributes
     ----------
     name
-        ``"frames"``, or the name of a stream of others.
+        ``"frames"``, or the name of an external stream.
     streams
-        What it is made of, side by side; they share one time.
+        The streams whose columns the table combines; they share one time.
     names
-        What the columns are called in the table.
+        Names of the table's columns.
     """
 
     name: str
@@ -33,7 +33,7 @@ class StreamTable:
     names: Sequence[str]
 
     def batches(self) -> "Iterator[pa.RecordBatch]":
-        """Yield the rows; what is missing is null. At least one batch, be it empty."""
+        """Yield at least one batch of rows, possibly empty; missing values are null."""
         import pyarrow as pa
 
         at = 0
@@ -56,9 +56,9 @@ def is_own(stream: Stream) -> bool:
 
 
 def stream_tables(session: SessionRecord) -> Iterator[StreamTable]:
-    """Yield the session's frames as one table, then each stream of others.
+    """Yield the session's frames as one table, then each external stream.
 
-    Columns of frames are called after their group: ``state_joint_angle_slew``.
+    Names of frames' columns begin with their group: ``state_joint_angle_slew``.
     """
     own = [stream for stream in session.streams.values() if is_own(stream)]
     names = [f"{stream.name}.{name}" for stream in own for name in stream.units]
@@ -107,7 +107,7 @@ def _unlike(taken: Collection[str], name: str) -> str:
 
 
 def snake_case(name: str) -> str:
-    """Return a name that every table reader takes as it is."""
+    """Return a name that every table reader accepts unchanged."""
     letters = "".join(letter if letter.isalnum() else "_" for letter in name.lower())
     letters = letters.strip("_") or "column"
     return letters if letters[0].isalpha() else f"x{letters}"

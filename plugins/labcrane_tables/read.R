@@ -1,4 +1,4 @@
-# Loads a whole export of labcrane in one call:
+# Load a complete export of labcrane with one call:
 #
 #   source("read.R"); study <- read_labcrane(".")
 #   study$trials                          one row per movement
@@ -6,8 +6,8 @@
 #   study$streams[["NAME_ses-01_frames"]] one row per tick
 #   study$codebook                        unit, meaning and source of every column
 #
-# Streams are Parquet, read with the package arrow or nanoparquet; export with --set streams=csv for
-# those that no package is needed for. Everything else needs none.
+# Streams are Parquet files, which the package arrow or nanoparquet reads. Export with
+# --set streams=csv for streams that need no package. All other files need none.
 
 read_labcrane <- function(folder = ".") {
   table <- function(name) {

@@ -129,15 +129,16 @@ def _write_packed_csv(table: StreamTable, path: Path) -> None:
 
 @contextmanager
 def packed(path: Path) -> Iterator[gzip.GzipFile]:
-    """Give a gzipped file whose head says neither what it was called nor when it was made."""
+    """Open a gzipped file for writing, without file name and time in its header."""
     with path.open("wb") as file, gzip.GzipFile("", "wb", GZIP_LEVEL, file, mtime=0) as out:
         yield out
 
 
 def joined(tables: "Sequence[pd.DataFrame]") -> "pd.DataFrame":
-    """Return tables of the same columns below one another; those without rows say nothing.
+    """Concatenate tables with the same columns; tables without rows are ignored.
 
-    A column that holds numbers of some people and words of others, as after an amendment, is words.
+    A column with numbers for some participants and words for others, as after an amendment,
+    contains words.
     """
     import pandas as pd
 

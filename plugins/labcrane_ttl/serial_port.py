@@ -1,4 +1,4 @@
-"""Serial port as a line: bytes out in the tick, echoes stamped as they come."""
+"""Serial port as a line: bytes are sent in the tick, echoes get a timestamp on arrival."""
 
 import math
 import os

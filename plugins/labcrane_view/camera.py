@@ -1,4 +1,4 @@
-"""One camera of a view: where it stands, what it sees, and when."""
+"""One camera of a view: its position, its picture and its timing."""
 
 import math
 from collections import deque
@@ -30,9 +30,9 @@ class Viewport:
     Attributes
     ----------
     picture
-        Width and height of the camera's whole picture, what no monitor shows included.
+        Width and height of the camera's whole picture, with the parts that no monitor shows.
     pieces
-        What of the picture is where in the window.
+        Parts of the picture, and their places in the window.
     """
 
     left: int
@@ -67,19 +67,19 @@ class DelayLine:
 
 
 class Camera:
-    """A camera that looks at the stage from its place in the scene, or from a link.
+    """A camera that is fixed in the scene or attached to a link.
 
-    One with a frame rate or a delay of its own is drawn into a picture, which stands in the window
-    until the next one is due.
+    A camera with its own frame rate or delay is drawn into a picture, which the window shows until
+    the next one is due.
 
     Attributes
     ----------
     boxes
         The areas of interest in its picture.
     part
-        Where its picture is in the window, once it is open.
+        Place of its picture in the window, once the camera is open.
     seen
-        When what its picture shows happened, in seconds.
+        Time of the content of its picture, in seconds.
     """
 
     def __init__(self, settings: CameraSettings, machine: Machine) -> None:
@@ -110,7 +110,7 @@ class Camera:
 
     @property
     def apart(self) -> bool:
-        """Whether it has a picture of its own, with a frame of its own."""
+        """Whether the camera has a separate picture, with its own frame."""
         return self.settings.rate_hz is not None or self.settings.delay_s > 0.0
 
     def open(
@@ -122,9 +122,9 @@ class Camera:
         back: Sequence[float],
         must_see: FloatArray,
     ) -> Any:
-        """Make its region in ``target``; return its picture if it has one of its own.
+        """Make the camera's region in ``target``; return its separate picture, if it has one.
 
-        ``must_see`` are the points that one framed on targets must hold, shape ``(n, 3)``.
+        A camera with ``look: targets`` must show the points ``must_see``, shape ``(n, 3)``.
         """
         deep = self.settings.shows == "depth"
         self._stage, self.part = stage, part
@@ -180,12 +180,12 @@ class Camera:
         return lens
 
     def drawn(self) -> None:
-        """Be told that a picture was drawn."""
+        """Note that a picture was drawn."""
         for backdrop in self._backdrops:
             backdrop.drawn()
 
     def take(self, frame: Frame) -> Frame | None:
-        """Take a frame; return the one to be drawn now, None while the last picture stands."""
+        """Take a frame; return the frame to draw now, None while the last picture stays."""
         past = self._delay.of(frame)
         now, rate = frame.tick.due, self.settings.rate_hz
         if now < self._due - ROUNDING_S:

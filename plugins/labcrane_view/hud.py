@@ -63,12 +63,12 @@ WORDS: Mapping[str, Mapping[str, str]] = {
 
 
 class Hud:
-    """Says in words how things stand.
+    """Shows the state of trial and session in words.
 
     Parameters
     ----------
     wanted
-        Which lines, by their names in the settings.
+        Names of the lines, as in the settings.
     """
 
     def __init__(self, wanted: Sequence[str], language: str, run: Run) -> None:

@@ -177,7 +177,7 @@ class Text:
 
 
 class Curtain:
-    """One word over the whole picture, which is dimmed behind it: nobody goes on by mistake."""
+    """One word over the whole, dimmed picture, so that operators do not continue by mistake."""
 
     def __init__(
         self, overlay: Overlay, size: tuple[int, int], boxes: Sequence[Box], font: Any

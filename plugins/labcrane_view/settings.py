@@ -392,43 +392,45 @@ class ViewSettings(Settings):
         if max(self.size) > MOST_PIXELS:
             found["size"] = f"is {self.size[0]} by {self.size[1]} pixels, more than any screen has"
         if self.patch is not None and self.patch.size > min(self.size):
-            found["patch.size"] = f"is {self.patch.size} pixels, and {min(self.size)} are there"
+            found["patch.size"] = (
+                f"is {self.patch.size} pixels, but the window has only {min(self.size)}"
+            )
         if self.gaze_markers is not None and 2 * self.gaze_markers.size > min(self.size):
             found["gaze_markers.size"] = (
-                f"is {self.gaze_markers.size} pixels: two take more than the {min(self.size)} that "
-                "are there"
+                f"is {self.gaze_markers.size} pixels: two need more than the window's "
+                f"{min(self.size)}"
             )
         if self.delay_s > LONGEST_DELAY_S:
-            found["delay_s"] = f"is {self.delay_s:g} s: nobody steers by a picture so late"
+            found["delay_s"] = f"is {self.delay_s:g} s, too late for steering by the picture"
         if self.rate_hz is not None and self.rate_hz < FEWEST_PICTURES_HZ:
-            found["rate_hz"] = f"is {self.rate_hz:g} Hz: a movement is seen to jump"
+            found["rate_hz"] = f"is {self.rate_hz:g} Hz: movements appear to jump"
         if self.viewing_m is not None and self.viewing_m > FARTHEST_VIEWING_M:
             found["viewing_m"] = f"is {self.viewing_m:g} m from the eye to the screen"
         if self.text_arcmin is not None and not FEWEST_ARCMIN <= self.text_arcmin <= MOST_ARCMIN:
-            found["text_arcmin"] = f"is {self.text_arcmin:g} minutes of arc, and 16 to 22 are usual"
+            found["text_arcmin"] = f"is {self.text_arcmin:g} minutes of arc; 16 to 22 are usual"
         if self.hint_s < SHORTEST_HINT_S:
             found["hint_s"] = f"is {self.hint_s:g} s, too short to read a hint"
         return found
 
     def _told_to_everybody(self) -> dict[str, str]:
-        """Return what tells the operator of the task's error, or of success, in every group."""
+        """Return the settings that show the operator error or success in every group."""
         others = self.seen_by == "examiner"
         if others and (self.all_screens or self.display == "hidden"):
             return {}
         found = {}
         if "distance" in self.hud_lines:
             found["hud"] = (
-                "has distance, and the window no screen of its own: where there is one monitor, "
-                "the operator sees the task's error in every group; give the examiner's monitor, "
+                "has distance, but the window has no screen of its own: with one monitor, the "
+                "operator sees the task's error in every group; give the experimenter's monitor, "
                 "as screen: 0, or leave distance out of hud"
                 if others
-                else "has distance, which tells the operator the task's error in every group, also "
-                "in one without feedback; leave it out, make it feedback of a group, or write "
+                else "has distance, which shows the operator the task's error in every group, even "
+                "without feedback; leave it out, make it feedback of a group, or write "
                 "seen_by: examiner if the operator does not see this view"
             )
         if self.patch is not None and (told := [e for e in self.patch.on if e in ENTERING]):
             found["patch"] = (
-                f"changes on {told[0]}, which tells the operator, in every group, when the target "
+                f"changes on {told[0]}, which shows the operator, in every group, when the target "
                 "is reached; cover the patch with the photodiode, or let it change on other events"
             )
         return found

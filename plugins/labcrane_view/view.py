@@ -268,7 +268,7 @@ class View(Feedback):
         return f"{width}x{height} ({asked[0]}x{asked[1]} has no room beside the other windows)"
 
     def picture(self) -> npt.NDArray[np.uint8]:
-        """Return what the window shows, shape ``(height, width, 3)``, red first, from the top."""
+        """Return the window's picture, shape ``(height, width, 3)``, red first, from the top."""
         found = self._opened().output.get_screenshot()
         width, height = found.get_x_size(), found.get_y_size()
         bytes_ = np.frombuffer(found.get_ram_image_as("RGB"), np.uint8)
@@ -293,11 +293,11 @@ class View(Feedback):
         return files
 
     def redraw(self) -> None:
-        """Draw the same picture again; what the rest of :meth:`present` costs shows beside it."""
+        """Draw the same picture again, to measure the rest of :meth:`present` by comparison."""
         self._opened().engine.render_frame()
 
     def save(self, path: Path) -> None:
-        """Write what the window shows to a PNG file."""
+        """Write the window's picture to a PNG file."""
         if self._window is None or not self._window.output.save_screenshot(
             core.Filename.from_os_specific(str(path.absolute()))  # Panda3D's own folder stays
         ):

@@ -34,17 +34,17 @@ CHUNK = 4096
 class MergedXdf(Exporter):
     """One file per session, for EEGLAB, MNE and pyxdf.
 
-    The session's frames are the streams ``labcrane.state``, ``labcrane.input`` and so on; streams
-    of others keep their names and number formats, and are stamped with corrected time. Its events
-    are three streams of markers: ``labcrane.names`` to epoch by (``trial_start``),
+    The session's frames are the streams ``labcrane.state``, ``labcrane.input`` and so on. External
+    streams keep their names and number formats, and have corrected timestamps. The session's events
+    are three streams of markers: ``labcrane.names`` for epochs (``trial_start``),
     ``labcrane.labels`` with block and condition (``trial_start/block=learning/side=left``), and
-    ``labcrane.markers`` with all that is known of each, as JSON. What the names mean, also in HED,
-    is in ``labcrane_labels.json``. Marks that people made afterwards are ``labcrane.annotations``.
+    ``labcrane.markers`` with all data of each event, as JSON. ``labcrane_labels.json`` explains the
+    names, also in HED. ``labcrane.annotations`` contains annotations added after the recording.
 
-    Every stream's clock offset is 0, so that nobody corrects twice. A regular stream that has
-    holes, or whose steps are not even, states no rate: readers put a line through the stamps of one
-    that does, hole and all. Its rate is under ``desc/labcrane/nominal_srate``. A stream whose clock
-    could not be corrected keeps its own time, and says so there too.
+    Every stream's clock offset is 0, so that readers do not correct it twice. A regular stream with
+    gaps or uneven steps states no rate, because readers fit a line through the timestamps of a
+    stream that does, across the gaps. Its rate is under ``desc/labcrane/nominal_srate``. A stream
+    whose clock could not be corrected keeps its own time, and the same place states this.
     """
 
     shared = (SIDECAR,)

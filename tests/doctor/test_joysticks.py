@@ -104,9 +104,9 @@ def test_sticks_that_are_not_there_are_named(table: Desk) -> None:
 
 def test_without_a_person_the_rest_position_is_looked_at(table: Desk) -> None:
     found = looked_at(table.plug(), table.plug())
-    assert "left x rests at +0.0 % of its way" in said(found, Verdict.PASS)
+    assert "left x rests at +0.0 % of its range" in said(found, Verdict.PASS)
     warned = said(found, Verdict.WARN)
-    assert "not told apart" in warned[0]
+    assert "not identified" in warned[0]
     assert warned[-1].endswith("were not looked at: nobody moves them")
     assert not said(found, Verdict.FAIL)
 
@@ -116,15 +116,15 @@ def test_a_stick_that_does_not_rest_in_its_centre_is_told(table: Desk) -> None:
     left.move(X, 2000)  # 6.1 % of 32767
     right.move(Y, -FULL)
     found = looked_at(left, right)
-    assert "left x rests at +6.1 % of its way" in said(found, Verdict.WARN)
-    assert said(found, Verdict.FAIL) == ["right y rests at -97.7 % of its way"]
+    assert "left x rests at +6.1 % of its range" in said(found, Verdict.WARN)
+    assert said(found, Verdict.FAIL) == ["right y rests at -97.7 % of its range"]
 
 
 def test_a_calibrated_centre_counts(table: Desk) -> None:
     left, right = table.plug(), table.plug()
     identified(AxisRange(minimum=-FULL, centre=2000, maximum=FULL))
     left.move(X, 2000)
-    assert "left x rests at +0.0 % of its way" in said(looked_at(left, right), Verdict.PASS)
+    assert "left x rests at +0.0 % of its range" in said(looked_at(left, right), Verdict.PASS)
 
 
 def test_sticks_in_order_pass_every_movement(table: Desk) -> None:
@@ -132,7 +132,7 @@ def test_sticks_in_order_pass_every_movement(table: Desk) -> None:
     assert not said(found, Verdict.FAIL)
     passed = said(found, Verdict.PASS)
     assert "left x moves as it should" in passed
-    assert "right y reaches -98 to +98 % of its way" in passed
+    assert "right y reaches -98 to +98 % of its range" in passed
     # One value a look, a look a millisecond.
     assert any(line.startswith("left stick gave 1000 new values a second") for line in passed)
 
@@ -148,7 +148,7 @@ def test_a_stuck_axis_and_a_slow_stick_are_told(table: Desk) -> None:
     right.move = lambda axis, raw: None if axis == X else move(axis, raw)  # type: ignore[method-assign]
     found = looked_at(left, right, ask=True)
     assert "right x did not move" in said(found, Verdict.FAIL)
-    assert "right x reaches +0 to +0 % of its way" in said(found, Verdict.FAIL)
+    assert "right x reaches +0 to +0 % of its range" in said(found, Verdict.FAIL)
     right.move = lambda axis, raw: None  # type: ignore[method-assign]
     found = looked_at(left, right, ask=True)
     assert "right stick gave 0 new values a second while it moved" in said(found, Verdict.WARN)

@@ -54,7 +54,7 @@ def test_a_lever_that_is_no_number_shuts_its_valve_at_once_and_is_named(
     commands.take(levers(broken, -20.0), 0.01)
     assert commands.signals(0.01)[0] == [0.0, -50.0]
     assert commands.silent(0.01) == (
-        f"Levers.Boom is {broken}, which is not a number; see what is wrong with the panel"
+        f"Levers.Boom is {broken}, which is not a number; check the panel"
     )
     commands.take(levers(40.0, -20.0), 0.02)
     assert commands.silent(0.02) is None

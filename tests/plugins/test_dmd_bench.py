@@ -442,5 +442,5 @@ def test_without_the_reader_of_dbc_files_a_bus_is_refused_before_anything_is_rec
     words = ["--segment", "boom", "--signal", "1", "--angle", "a.b", "--bus", "nothing:there"]
     assert main(["dmd", "record", str(tmp_path / "kept"), *words]) == 1
     said = " ".join(capsys.readouterr().err.split())
-    assert "what is on a CAN bus needs cantools, which is not installed: pip install" in said
+    assert "messages of a CAN bus needs cantools, which is not installed: pip install" in said
     assert not (tmp_path / "kept").exists()

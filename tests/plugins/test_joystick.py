@@ -258,7 +258,7 @@ def test_sticks_in_other_sockets_than_identified_are_refused(table, config):
 
 def test_facts_say_what_was_not_done(sticks, running):
     facts = running.metadata()
-    assert facts["identified"] == "not identified: the first stick is taken for the left"
+    assert facts["identified"] == "not identified: the first stick is used as the left one"
     assert facts["calibrated"] == "not calibrated: full range"
     assert facts["right.name"] == "Thrustmaster T.16000M"
     assert facts["right.instance"] == sticks[1].instance

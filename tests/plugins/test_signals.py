@@ -137,8 +137,8 @@ def test_both_electrodes_of_a_bridge_name_each_other() -> None:
     faults = monitor.look(np.empty(len(case.samples)), case.samples)
     texts = {fault.channel: fault.message for fault in faults if fault.kind == case.kind}
     one, other = sorted(case.channels)
-    assert f"is the same as {other}" in texts[one]
-    assert f"is the same as {one}" in texts[other]
+    assert f"has the same signal as {other}" in texts[one]
+    assert f"has the same signal as {one}" in texts[other]
 
 
 def test_the_frequency_of_the_mains_is_told() -> None:

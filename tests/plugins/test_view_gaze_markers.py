@@ -206,5 +206,5 @@ def test_markers_that_cannot_be_are_refused(settings: dict[str, object], said: s
 def test_markers_larger_than_the_window_are_asked_about() -> None:
     settings = ViewSettings(size=(320, 180), gaze_markers={"size": 100})
     assert settings.doubts(ch8())["gaze_markers.size"] == (
-        "is 100 pixels: two take more than the 180 that are there"
+        "is 100 pixels: two need more than the window's 180"
     )

@@ -205,10 +205,10 @@ def test_the_operator_sees_no_distance_unless_asked_for_and_the_examiner_does() 
     for hud in (None, ("distance",)):
         alone = ViewSettings(seen_by="examiner", hud=hud).doubts(ch8())
         assert list(alone) == ["hud"]
-        assert "where there is one monitor, the operator sees the task's error" in alone["hud"]
-        assert "give the examiner's monitor, as screen: 0" in alone["hud"]
+        assert "with one monitor, the operator sees the task's error" in alone["hud"]
+        assert "give the experimenter's monitor, as screen: 0" in alone["hud"]
     asked = ViewSettings(hud=("distance",)).doubts(ch8())
-    assert "tells the operator the task's error in every group" in asked["hud"]
+    assert "shows the operator the task's error in every group" in asked["hud"]
 
 
 def test_check_warns_of_an_error_that_every_group_is_shown(
@@ -222,11 +222,11 @@ def test_check_warns_of_an_error_that_every_group_is_shown(
     path.write_text(SHORT + "views: {cab: {use: view, hud: [trial, distance]}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     said = capsys.readouterr()
-    assert "question: views.cab.hud has distance, which tells the operator the task's" in said.out
+    assert "question: views.cab.hud has distance, which shows the operator the task's" in said.out
     always = "views: {cab: {use: view, patch: {on: [target.entered]}}}\n"
     path.write_text(SHORT + always, encoding="utf-8")
     assert main(["check", str(path)]) == 0
-    assert "views.cab.patch changes on target.entered, which tells the" in capsys.readouterr().out
+    assert "views.cab.patch changes on target.entered, which shows the" in capsys.readouterr().out
     path.write_text(SHORT + "views: {hum: {use: sonification}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     assert (

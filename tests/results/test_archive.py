@@ -130,7 +130,7 @@ def test_nothing_is_written_with_anything_personal_in_it(
     (changed,) = find_cohort(tmp_path / "data", ["simulated"]).included
     out = tmp_path / "out"
     out.mkdir()
-    with pytest.raises(ProtocolError, match=r"what could lead to a person: recordings/.*events"):
+    with pytest.raises(ProtocolError, match=r"would contain personal data: recordings/.*events"):
         Archive(ArchiveSettings(license="CC0-1.0")).export([changed], out)
     assert list(out.iterdir()) == []
 

@@ -1,1 +1,1 @@
-"""The arm that moves by a model: its valves, its bodies in the engine, and what it touches."""
+"""The arm that moves by a model: its valves, its bodies in the engine, and its contacts."""

@@ -34,16 +34,16 @@ class ContactWindow:
 
 
 class Contacts:
-    """What presses on each part of each thing.
+    """The contact forces on each part of each thing, in N.
 
-    ``pressed`` is by the machine and by things that move, on what is fixed by the machine alone;
-    ``support`` by the ground and obstacles. ``hits`` is what presses on the parts of jointed
-    figures where they touch obstacles, but for those that carry them; ``grounds`` is what presses
-    on the same parts where they lie: on the ground, and on what carries them. Contact points at a
-    distance have no force; the engine lists them all the same.
+    ``pressed`` is the force of the machine and of moving things; on fixed things, of the machine
+    alone. ``support`` is the force of the ground and of obstacles. ``hits`` is the force of
+    obstacles on the parts of articulated figures, except of obstacles that carry them. ``grounds``
+    is the force on the same parts of the ground and of the things that carry them. The engine also
+    lists contact points at a distance, which have no force.
 
-    ``by_link`` is the force of each of the arm's links on each thing, ``fixed`` that of each on
-    whatever is fixed and has a limit. All in N.
+    ``by_link`` is the force of each of the arm's links on each thing; ``fixed`` is their force on
+    fixed things with a limit.
 
     Parameters
     ----------

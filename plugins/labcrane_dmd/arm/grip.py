@@ -52,13 +52,13 @@ class Loose:
 
 
 class Grip:
-    """Forms when both jaws press on a thing, and breaks when it is pulled out or let go.
+    """A grip, which forms when both jaws press on a thing, and ends when it slips or is released.
 
-    What has slipped is gripped again only after the jaws were opened, and nothing else while it is
-    still at them. An episode begins with a grip
-    and ends when the thing has left the jaws: ``left`` counts those that have ended, ``slipped``
-    says whether what came loose last did so by itself, and ``height`` how far what is held could
-    fall, or what came loose last fell past the jaws and could still fall when they lost it, in m.
+    A thing that slipped can be gripped again only after the jaws were opened; while it is still at
+    the jaws, they cannot grip another thing. An episode begins with a grip and ends when the thing
+    has left the jaws. ``left`` is the number of ended episodes. ``slipped`` tells whether the last
+    thing came loose by itself. ``height``, in m, is how far the held thing could fall; for the last
+    loose thing, how far it fell past the jaws plus how far it could still fall when it left them.
 
     Parameters
     ----------
@@ -86,12 +86,12 @@ class Grip:
         self.left = 0
 
     def tighten(self, force: float) -> None:
-        """Press on what is held with so much more, in N."""
+        """Increase the force on the held thing by ``force``, in N."""
         if self.held is not None:
             self.held.squeeze += force
 
     def squeezed(self, most: float) -> Mapping[Key, float]:
-        """Return with how much the jaws press on what they hold, each with ``most`` N at most."""
+        """Return the force of both jaws on the held thing, at most ``most`` N for each jaw."""
         if self.held is None or self.held.squeeze == 0.0:
             return {}
         self.held.squeeze = min(self.held.squeeze, most)

@@ -6,10 +6,10 @@ from labcrane_dmd.arm.settings import OverloadSettings
 
 
 class Overload:
-    """One joint's overload episodes; a direction is that in which the drive pushes.
+    """One joint's overload episodes; their direction is that of the drive's force.
 
-    An episode ends when the load has been below the release for the hold time: a load that
-    trembles around the limit is one overload.
+    An episode ends when the load has been below the release for the hold time. A load that
+    fluctuates around the limit is one overload.
     """
 
     def __init__(self, settings: OverloadSettings, dt: float) -> None:

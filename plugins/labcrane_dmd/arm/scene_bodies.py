@@ -33,7 +33,7 @@ DISTANCE = 8
 
 @dataclass(frozen=True, slots=True)
 class StandingBody:
-    """A thing in the engine: its number there, and what is behind its links.
+    """A thing in the engine: its number, parts and segments.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ def add_ground(client: int) -> int:
 
 
 def add(placed: PlacedObject, client: int) -> StandingBody:
-    """Put a thing into the engine; what is jointed moves in its joints, all else as one piece."""
+    """Put a thing into the engine: articulated with joints, all others as one rigid body."""
     return _add_jointed(placed, client) if placed.jointed else _add_rigid(placed, client)
 
 
@@ -164,9 +164,9 @@ def _shares(placed: PlacedObject) -> list[float]:
 
 
 def check_apart(standing: list[StandingBody], arm: int, client: int) -> None:
-    """Refuse a scene in which things stand in each other or in the arm.
+    """Reject a scene in which things overlap each other or the arm.
 
-    What is fixed may stand in what is fixed, as rubble does.
+    Fixed things may overlap fixed things, as in rubble.
     """
     bodies = [("the arm", arm), *((each.placed.name, each.body) for each in standing)]
     fixed = {each.body for each in standing if each.placed.kind == "obstacle"}

@@ -19,7 +19,7 @@ from labcrane.core import (
 
 
 class ValveSettings(Settings):
-    """The operator's axes go to the valves as they are."""
+    """The operator's axes go to the valves unchanged."""
 
     map: Annotated[dict[JointName, AxisName], Once()] = Field(default_factory=dict)
     """Which axis opens which joint's valve; joints that are not named here have the axis

@@ -1,4 +1,4 @@
-"""Places of windows on the desktop: on monitors, beside one another, and back after a loss."""
+"""Places of windows on the desktop: on monitors, next to each other, and back after a loss."""
 
 import threading
 from collections.abc import Sequence
@@ -51,16 +51,16 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class PictureSpan:
-    """A window and the pieces of one picture in it: the frames between monitors hide some of it.
+    """A window and the parts of one picture in it; the gaps between monitors hide some parts.
 
     Attributes
     ----------
     place
-        Of the window on the desktop.
+        Place of the window on the desktop.
     picture
-        Width and height of the whole picture, hidden parts and all, in pixels.
+        Width and height of the whole picture with its hidden parts, in pixels.
     pieces
-        What of it is on each monitor.
+        The part of it on each monitor.
     """
 
     place: Place
@@ -99,12 +99,12 @@ def span(found: Sequence[Monitor], gap_px: int) -> PictureSpan:
 
 
 def placed(settings: ViewSettings, before: Sequence[ViewSettings], desktop: Pixels) -> PictureSpan:
-    """Return where a view's window lies: on its monitors, or beside those before it.
+    """Return the place of a view's window: on its monitors, or next to the earlier windows.
 
     Raises
     ------
     DeviceError
-        A monitor is not there, or there is no room.
+        A monitor is missing, or there is no room.
     """
     if settings.display == "hidden":
         return whole(((0, 0), settings.size))
@@ -125,7 +125,7 @@ def placed(settings: ViewSettings, before: Sequence[ViewSettings], desktop: Pixe
 
 
 def per_metre(settings: ViewSettings, monitor: Monitor | None) -> float:
-    """Return pixels in a metre of the glass, by ``screen_mm`` or by what the monitor says.
+    """Return the screen's pixels per metre, from ``screen_mm`` or as the monitor reports.
 
     Raises
     ------
@@ -221,15 +221,15 @@ def _find(found: Sequence[Monitor], wanted: int | str) -> Monitor | None:
 
 
 class WindowPlacer:
-    """Moves a window to a monitor that is left when its own is lost, and back when it is there.
+    """Move a window to a remaining monitor when its own is lost, and back when it returns.
 
-    The desktop is asked in a thread of its own, which costs the picture nothing. Nothing is done to
-    a window that has no screen of its own.
+    A separate thread queries the desktop, which does not delay the picture. A window without a
+    ``screen`` stays where it is.
 
     Attributes
     ----------
     lost
-        How many of its monitors are not there.
+        Number of its monitors that are missing.
     """
 
     def __init__(self, settings: ViewSettings, place: Place) -> None:
@@ -246,12 +246,12 @@ class WindowPlacer:
             threading.Thread(target=self._watch, name="monitors", daemon=True).start()
 
     def keep(self, output: Any) -> None:
-        """Move the window if monitors have gone or come since the last time.
+        """Move the window if monitors were lost or connected since the last call.
 
         Raises
         ------
         DeviceError
-            The desktop can no longer be asked which there are.
+            The desktop's monitors can no longer be queried.
         """
         if self._failure is not None:
             raise DeviceError(

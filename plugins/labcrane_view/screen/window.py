@@ -1,4 +1,4 @@
-"""Window, or a picture without one, by whatever renderer there is."""
+"""Window, or a picture without a window, with any available renderer."""
 
 import os
 from collections.abc import Sequence
@@ -51,9 +51,9 @@ class Window:
     shaders
         Whether the renderer runs our shader; the software renderer does not.
     driver
-        What draws, in its own words.
+        Name of the renderer, as it reports itself.
     span
-        Where it lies, and which part of the picture is where in it.
+        Its place, and the places of the picture's parts in it.
     """
 
     engine: Any
@@ -64,7 +64,7 @@ class Window:
 
     @property
     def software(self) -> bool:
-        """Whether no graphics card takes part."""
+        """Whether drawing does not use a graphics card."""
         return not self.shaders or any(
             word in self.driver.lower() for word in ("llvmpipe", "softpipe", "swrast")
         )
@@ -77,20 +77,20 @@ class Window:
 def open_window(
     settings: ViewSettings, title: str, before: Sequence[ViewSettings] = (), samples: int = 0
 ) -> Window:
-    """Open what the settings ask for.
+    """Open the window or hidden buffer of the settings.
 
     Parameters
     ----------
     before
-        Views whose windows may be on the desktop already: this one lies beside them, and is smaller
-        where there is no room. A window manager may put it elsewhere.
+        Views whose windows may already be on the desktop: this window is placed next to them, and
+        is smaller if there is no room. A window manager may move it.
     samples
-        Samples a pixel to ask for; the renderer may have fewer.
+        Requested samples per pixel; the renderer may have fewer.
 
     Raises
     ------
     DeviceError
-        There is no display, no such monitor, no room, or nothing that can draw.
+        There is no display, no such monitor, no room, or no renderer.
     """
     core.load_prc_file_data("labcrane", CONFIGURATION)
     hidden = settings.display == "hidden"
