@@ -34,7 +34,7 @@ class Order(StrEnum):
     HINT = "hint"  # show words to the operator
     REPORT = "report"  # say that something was seen, of what the running task lists
     ANSWER = "answer"  # to a question, as JSON: questionnaire, item, value
-    SUBMIT = "submit"  # hand in the questionnaire that is asked
+    SUBMIT = "submit"  # submit the questionnaire that is shown
     CONSENT = "consent"  # to the text of this version, given before the session begins
     DENIED = "denied"  # from a page: a request without the right to make it
     SETTING = "setting"  # change a setting of a cue or sound: tone.far=3
@@ -108,7 +108,7 @@ class AnswerGiven:
 
 @dataclass(frozen=True, slots=True)
 class Submission:
-    """The questionnaire that is asked is handed in."""
+    """The questionnaire that is shown is submitted."""
 
 
 @dataclass(frozen=True, slots=True)

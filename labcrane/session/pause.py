@@ -16,7 +16,7 @@ from labcrane.session.commands import (
 )
 
 INPUT, DISK = "input", "disk"
-"""What can hold a session beside people, lost streams and feedback."""
+"""What can hold a session, in addition to people, lost streams and feedback."""
 
 
 class Suspenders:

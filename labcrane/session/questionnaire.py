@@ -47,7 +47,7 @@ class QuestionnaireForm:
     Attributes
     ----------
     over
-        Whether it has been handed in.
+        Whether it has been submitted.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class QuestionnaireForm:
         return self._end(by, handed_in=True, done=True)
 
     def leave(self, *, done: bool) -> Said:
-        """Return the event with which it ends without having been handed in.
+        """Return the event with which it ends without being submitted.
 
         ``done`` is whether it need not be asked again.
         """
@@ -219,7 +219,7 @@ class QuestionnaireRun:
 
     @property
     def over(self) -> bool:
-        """Whether it has been handed in."""
+        """Whether it has been submitted."""
         return self._form.over
 
     def begin(self, *, simulated: bool) -> Iterator[Said]:

@@ -341,7 +341,7 @@ class Sequencer:
             case AnswerGiven() | Submission() if (
                 questionnaire is not None and not questionnaire.over
             ):
-                self._say(*questionnaire.handle(request, about))  # not handed in twice in one tick
+                self._say(*questionnaire.handle(request, about))  # not submitted twice in one tick
             case _:
                 # Every door has looked already; the loop must not fall when one has not.
                 beyond = beyond_limits(command)

@@ -9,7 +9,7 @@ from labcrane.design.tracks import SUCCESS
 
 
 class TrialRun:
-    """Runs beside the loop while a trial is under way.
+    """Runs next to the loop while a trial is under way.
 
     Attributes
     ----------

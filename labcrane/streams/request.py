@@ -121,7 +121,7 @@ class StreamRequest:
         if self.channels is not None and channels != self.channels:
             found.append(f"has {channels} channels; {self.channels} are expected")
         if self.rate_hz is not None and abs(rate_hz - self.rate_hz) > 0.01 * self.rate_hz:
-            found.append(f"has a nominal rate of {rate_hz:g} Hz, {self.rate_hz:g} Hz are expected")
+            found.append(f"has a nominal rate of {rate_hz:g} Hz; {self.rate_hz:g} Hz are expected")
         return found
 
     def __str__(self) -> str:

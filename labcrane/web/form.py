@@ -112,7 +112,7 @@ class Form:
         self._refreshers.append(refresh)
 
     def _one_by_one(self, cards: "Sequence[ui.element]", hand_in: "ui.button") -> None:
-        """Show one question a screen; what is handed in is still the whole."""
+        """Show one item per screen; the whole questionnaire is submitted together."""
         from nicegui import ui  # noqa: PLC0415
 
         def go(step: int) -> None:
@@ -255,7 +255,7 @@ class Form:
         return words.declined if session.answers[item.name] is None else words.saved
 
     def _refusal(self) -> str:
-        """Return why the last answer, or what was handed in, was not taken."""
+        """Return why the last answer or submission was not accepted."""
         session = self._context.session
         if not (session.refusal and session.form):
             return ""

@@ -25,8 +25,8 @@ LAST_LOOK_S = 0.5
 """How long a page has to show the end before its process ends, where nobody looks at it."""
 
 GONE_S = 10.0
-"""How long no browser may have the supervisor's page before it counts as closed: a reload leaves it
-for a moment, and on a busy computer for some seconds."""
+"""How long no browser may have the experimenter's page before it counts as closed: a reload
+leaves it for a moment, and on a busy computer for some seconds."""
 
 
 class PageHandle:
@@ -94,7 +94,7 @@ class PageHandle:
     def close(self, ended: SessionLeft) -> None:
         """Show the end until the experimenter has closed the page, and end the process.
 
-        Where no browser has it, nobody is waited for. An interrupt at the terminal closes it too.
+        It does not wait if no browser has it. An interrupt at the terminal closes it too.
         """
         with self._lock:
             self._told.append(Report(ended))

@@ -42,7 +42,7 @@ class PageContext:
     denied
         Told of what was refused.
     shown
-        What is to be seen beside the machine.
+        The shapes to be seen next to the machine.
     earlier
         What was measured before, to compare the newest movements with.
     close

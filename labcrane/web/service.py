@@ -54,7 +54,7 @@ class PageConfig:
     cameras
         Names of the cameras whose pictures are shown, by the view that sends them.
     data
-        The participant's folder, beside those of the others; None for no comparison.
+        The participant's folder, next to those of the others; None for no comparison.
     certificate, key
         Of the lab, in PEM; without them the pages are served without TLS.
     """
@@ -257,7 +257,7 @@ def _files(app: Any, context: PageContext) -> None:
 
     @app.get("/consent")  # type: ignore[untyped-decorator]  # app may be any ASGI app
     def consent() -> Response:
-        """Give the approved consent text, as it is asked for; no other file can be had."""
+        """Return the approved consent text on request, and no other file."""
         if not context.session.consent:
             return Response("no consent is asked for", NOT_FOUND)
         text = read_lock(context.study.path).consent

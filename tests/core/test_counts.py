@@ -155,5 +155,5 @@ def test_the_next_session_is_named_where_there_is_one(tmp_path: Path) -> None:
     study = a_study(tmp_path, TWO)
     visit = Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True)
     run(visit, ScriptedConsole())
-    with pytest.raises(ProtocolError, match=r"give the one that is next: --session 2 \('again'\)$"):
+    with pytest.raises(ProtocolError, match=r"use the next one: --session 2 \('again'\)$"):
         check_new(visit)

@@ -280,7 +280,7 @@ def test_the_target_and_the_cue_are_drawn_where_the_record_has_them(file: Path, 
 def test_a_session_without_frames_says_that_there_is_nothing_to_see(file: Path) -> None:
     record = open_recording(file).session(1)
     del record.streams["state"]
-    with pytest.raises(RecordingError, match=r"P001 has no frames of 'state'; there is nothing"):
+    with pytest.raises(RecordingError, match=r"P001 has no frames of 'state', so there is nothing"):
         Film(record, "P001")
     with pytest.raises(
         RecordingError, match=r"has no column 'joint'; it has time, joint.angle.slew"
@@ -353,7 +353,7 @@ def test_a_killed_session_is_shown_as_far_as_its_journal_goes_and_nothing_is_wri
     cut = Film(opened(folder, 1, tmp_path / "scratch", said.append), "cut")
     assert 0.3 * film.length < cut.length < film.length
     same_as_far_as(film, cut)
-    assert "shown is what its journals hold" in said[0]
+    assert "its journals are shown instead" in said[0]
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
 
 

@@ -45,7 +45,7 @@ class Earlier:
 
 
 def read_behind(folder: Path, study: str, session: int, measures: Iterable[str]) -> Earlier:
-    """Return what is read of the other participants beside ``folder``, by a thread, as it goes.
+    """Return the results of the other participants next to ``folder``; a thread reads them.
 
     Only folders with the same stamps as this one's count: pilots are not compared with people. Who
     was excluded counts nowhere.

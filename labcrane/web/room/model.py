@@ -1,4 +1,4 @@
-"""Model of the machine in a scene of NiceGUI: its bodies, and shapes beside it."""
+"""Model of the machine in a scene of NiceGUI: its bodies, and shapes around it."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ UPRIGHT = 1e-9
 
 
 class MachineModel:
-    """The bodies of a machine, and shapes beside it, in a scene of NiceGUI.
+    """The bodies of a machine, and shapes around it, in a scene of NiceGUI.
 
     Parameters
     ----------

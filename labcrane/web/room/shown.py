@@ -1,4 +1,4 @@
-"""Shapes beside the machine, as the session's views draw them: targets, and what cues show."""
+"""Shapes around the machine, as the session's views draw them: targets, and what cues show."""
 
 import json
 import threading
@@ -76,7 +76,7 @@ class ShownShapes:
         self._situation = situation
 
     def shapes(self, newest: Mapping[str, float]) -> list[Shape]:
-        """Return what is to be seen beside the machine; nothing before a frame has come.
+        """Return the shapes around the machine; nothing before a frame has come.
 
         Parameters
         ----------

@@ -128,7 +128,7 @@ class Overview:
     balanced
         Whether the groups differ by one at most.
     approval
-        Of the protocol beside the data, in words.
+        Of the protocol next to the data, in words.
     used, free
         Bytes of the data folder, and left on its disk.
     lasts
@@ -395,7 +395,7 @@ def _groups(
 
 
 def newest_report(register: Register) -> Path | None:
-    """Return where the newest report is, as far as it is still there."""
+    """Return the path of the latest report, if it still exists."""
     made = [Path(one.folder) for one in register.exports if one.exporter == "report"]
     return next((folder for folder in reversed(made) if (folder / "report.html").is_file()), None)
 

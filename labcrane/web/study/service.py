@@ -60,7 +60,7 @@ def _routes(app: Any, reader: Reader, registry: Callable[[], Registry], scratch:
 
     @app.get("/report/{path:path}")  # type: ignore[untyped-decorator]  # as above
     def report(path: str) -> Response:
-        """Give a file of the newest report, and none beside it."""
+        """Return a file of the latest report, and no other file."""
         try:
             folder = newest_report(read(Places(reader.data)))
         except LabcraneError as error:

@@ -107,11 +107,11 @@ class Film:
             self._own: Mapping[str, Stream] = {name: record.streams[name] for name in GROUPS}
         except KeyError as error:
             raise RecordingError(
-                f"{called} has no frames of {error}; there is nothing to see"
+                f"{called} has no frames of {error}, so there is nothing to show"
             ) from None
         self.time: FloatArray = self._own["loop"].time
         if not len(self.time):
-            raise RecordingError(f"{called} has no frame; there is nothing to see")
+            raise RecordingError(f"{called} has no frame, so there is nothing to show")
         self.start = float(self.time[0])
         self.length = float(self.time[-1]) - self.start
         context = record.context
@@ -378,4 +378,4 @@ class Film:
 
 
 def _nobody(velocity: FloatArray, state: FloatArray) -> FloatArray:
-    raise RecordingError("a recorded session was asked to steer; it can only be looked at")
+    raise RecordingError("a recorded session cannot be steered; it can only be viewed")

@@ -42,7 +42,7 @@ class Marks:
         try:
             if "withdraw" in asked:
                 withdraw(file, session, int(asked["withdraw"]))
-                return self.shown("taken back; the file keeps what it was")
+                return self.shown("withdrawn; the file keeps the original")
             begin, end = float(asked["t"]), float(asked["to"])
             annotate(file, session, self._start + begin, str(asked["text"]), self._start + end)
         except (LabcraneError, LookupError, TypeError, ValueError) as error:

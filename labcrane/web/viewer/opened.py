@@ -1,6 +1,6 @@
 """Opening of a recording to be looked at: as far as it goes, also after a kill or with damage.
 
-Nothing is written beside the recording: what its journals hold is put together elsewhere.
+Nothing is written next to the recording: the content of its journals is assembled elsewhere.
 """
 
 import shutil
@@ -16,7 +16,7 @@ from labcrane.session.postprocess import conclude
 
 
 def opened(path: Path, session: int, scratch: Path, say: Callable[[str], None]) -> SessionRecord:
-    """Return a session of a participant file, or of the journals beside it where that has none.
+    """Return a session of a participant file, or of the journals next to it if the file has none.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def opened(path: Path, session: int, scratch: Path, say: Callable[[str], None]) 
     folder.mkdir(parents=True, exist_ok=True)
     for journal in journals:
         shutil.copyfile(journal, folder / journal.name)
-    say(f"{file.name} does not give session {session} ({why}); shown is what its journals hold")
+    say(f"{file.name} does not give session {session} ({why}); its journals are shown instead")
     for done in recover(folder, conclude):
         if done.session == session and done.problem:
             raise RecordingError(f"neither {file} nor its journals can be read: {done.problem}")

@@ -66,7 +66,7 @@ export default {
       <span class="view-swatch mark"></span>your marks</p>
   </section>
   <section v-if="about.gaze" class="room-card"><h2>Gaze</h2>
-    <p id="looked"><strong>{{ glance.looked || 'no area' }}</strong> <span class="room-faint">is looked at, in the picture that the view had shown last; the display's own delay is not taken off</span></p>
+    <p id="looked"><strong>{{ glance.looked || 'no area' }}</strong> <span class="room-faint">is looked at, in the latest picture of the view; the display's delay is not subtracted</span></p>
     <svg id="gaze" class="view-gaze" :viewBox="picture" role="img" :aria-label="'gaze, at ' + (glance.looked || 'no area')">
       <g v-for="a in glance.areas" :key="a.name"><rect :class="{ looked: a.name === glance.looked }" :x="a.box[0]" :y="a.box[1]" :width="a.box[2] - a.box[0]" :height="a.box[3] - a.box[1]"><title>{{ a.name }}</title></rect></g>
       <polyline v-if="glance.trail.length > 1" :points="glance.trail.join(' ')"/>
@@ -76,16 +76,16 @@ export default {
       <line class="view-now" :x1="place(t, lane)" :x2="place(t, lane)" y1="0" y2="20"/></svg>
     <p class="room-faint view-legend"><template v-for="(name, n) in areaNames" :key="name"><span class="view-swatch" :style="{ background: colour(n) }"></span>{{ name }}</template></p>
   </section>
-  <section v-if="about.marking" class="room-card"><h2>Marks</h2>
-    <p class="room-faint">They are kept beside the recording and go into exports and the report; nothing recorded is changed. Write no names.</p>
+  <section v-if="about.marking" class="room-card"><h2>Annotations</h2>
+    <p class="room-faint">They are saved next to the recording and included in exports and the report; the recording is not changed. Write no names.</p>
     <form class="view-controls" @submit.prevent="mark()">
-      <label class="room-field view-words">Mark <input id="mark-text" v-model="words" maxlength="4000" autocomplete="off"></label>
+      <label class="room-field view-words">Annotation <input id="mark-text" v-model="words" maxlength="4000" autocomplete="off"></label>
       <button type="button" class="room-button" id="mark-from" :aria-pressed="from !== null" @click="from = from === null ? t : null">{{ from === null ? 'Begin here' : 'Begins at ' + clock(from) }}</button>
-      <button type="submit" class="room-button" id="mark-add" :disabled="!words.trim()">{{ from === null ? 'Mark this moment' : 'Mark until here' }}</button>
+      <button type="submit" class="room-button" id="mark-add" :disabled="!words.trim()">{{ from === null ? 'Annotate this moment' : 'Annotate until here' }}</button>
     </form>
     <p id="mark-said" role="status" :class="markSaid.startsWith('not kept') ? 'room-question' : 'room-faint'">{{ markSaid }}</p>
-    <div id="marks" class="room-scroll" tabindex="0" role="group" aria-label="Marks">
-      <p v-if="!marks.length" class="room-faint">None yet: go to a moment, press M, write what is to be seen.</p>
+    <div id="marks" class="room-scroll" tabindex="0" role="group" aria-label="Annotations">
+      <p v-if="!marks.length" class="room-faint">None yet. Go to a moment, press M, and describe what you see.</p>
       <div v-for="m in marks" :key="m.number" class="view-marked">
         <button type="button" class="view-event" @click="go(m.t)"><span>{{ clock(m.t) }}{{ m.to > m.t ? ' to ' + clock(m.to) : '' }}</span> {{ m.text }}</button>
         <button type="button" class="room-button" :aria-label="'Take back: ' + m.text" @click="takeBack(m)">Take back</button></div></div>

@@ -1,4 +1,4 @@
-"""Viewer's page: the machine as it was recorded, beside its time line and its signals."""
+"""Viewer's page: the machine as it was recorded, with its timeline and its signals."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
