@@ -21,7 +21,7 @@ EVENTS = (
     "targets.shown", "target.entered", "command.onset", "movement.onset", "movement.offset",
     "tap.ignored",
 )  # fmt: skip
-"""What a movement tells beside its beginning and end."""
+"""Events of a movement other than its beginning and end."""
 
 
 class AimingSettings(Settings):
@@ -73,8 +73,8 @@ class AimingSettings(Settings):
     that the noise of the machine's sensors shows for a tip at rest."""
 
     onset_hold_s: NonNegativeFloat = 0.1
-    """How long the tip must stay above the onset speed, in seconds. The event ``movement.onset``
-    comes so much later than the onset, whose time it is stamped with."""
+    """Time for which the tip must stay above the onset speed, in seconds. The event
+    ``movement.onset`` is sent after this time, with the timestamp of the onset."""
 
     limit_s: PositiveFloat = 30.0
     """Longest a movement may take, in seconds; then it ends as a time-out."""

@@ -109,7 +109,7 @@ class Bids(Exporter):
             path = at / "beh" / f"{named}_recording-{recording}_physio"
             write_bare_tsv(path.with_name(f"{path.name}.tsv.gz"), samples)
             write_json(path.with_name(f"{path.name}.json"), description)
-            if description["PhysioType"] == "eyetrack":  # which needs events and screen beside it
+            if description["PhysioType"] == "eyetrack":  # which also needs events and screen
                 write_tsv(at / "beh" / f"{named}_events.tsv", events)
                 write_json(at / "beh" / f"{named}_events.json", about)
             scans.append((f"beh/{path.name}.tsv.gz", 0.0))

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 REPEAT = "repeat"
-"""Tells apart events of one name at one moment: HED joins the tags of a moment, and refuses what is
-said twice."""
+"""Number that distinguishes events with the same name and time: HED joins the tags of one time, and
+rejects duplicates."""
 
 END = "trial.end"
 FAILED = "presentation_failed"

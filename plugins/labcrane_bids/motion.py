@@ -47,7 +47,7 @@ class TrackingSystem:
     def samples(self) -> Iterator[list[FloatArray]]:
         """Yield the samples' columns in chunks; the first column is seconds from sample 0."""
         stream, (zero,) = self._stream, self._stream.column("time", 0, 1)
-        ticks = ROWS - ROWS % self._every or self._every  # so that each piece begins with a sample
+        ticks = ROWS - ROWS % self._every or self._every  # so that each chunk begins with a sample
         for at in range(0, len(stream), ticks):
             values = stream.values(self._columns, at, at + ticks)
             time = stream.column("time", at, at + ticks) - zero

@@ -22,7 +22,8 @@ DEMOGRAPHICS = "demographics "
 
 CODES = {"female": "F", "male": "M", "other": "O", "left": "L", "right": "R", "both": "A"}
 OLDEST = 89
-"""Age in years from which BIDS recommends not to tell it: it could lead to a person."""
+"""Age in years above which BIDS recommends not to state the exact age, because it could identify a
+person."""
 
 KEYS = ["session", "step", "block", "trial"]
 

@@ -14,13 +14,13 @@ from labcrane_bids.settings import BidsSettings
 GAZE = "Gaze"
 ON_SCREEN = "gaze-on-screen"
 PUPIL = {"pupil": "pupil_size", "pupil_size": "pupil_size"}
-"""Channels of gaze beside its place that BIDS has names for; others keep their labels."""
+"""Other channels of gaze for which BIDS has names; all others keep their labels."""
 
 SYSTEMS = {
     "m": "gaze-in-world", "cm": "gaze-in-world", "mm": "gaze-in-world", "meters": "gaze-in-world",
     "rad": "eye-in-head", "deg": "eye-in-head", "degrees": "eye-in-head",
 }  # fmt: skip
-"""Coordinate system of gaze, by the unit of its x: what is in metres is in the world."""
+"""Coordinate system of gaze by the unit of x; metres mean world coordinates."""
 
 SPACES = {"screen": ON_SCREEN, "scene": "eye-in-head"}
 """Coordinate system of pixels and shares of a picture, by whose picture it is: a scene camera moves

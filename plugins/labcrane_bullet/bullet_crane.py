@@ -23,7 +23,7 @@ TORQUE = 3
 """Index of the motor's torque in the engine's joint state."""
 
 ALL = 1.0 - 1e-9
-"""Share of its torque at which a motor gives all that it has; the solver rounds."""
+"""Proportion of its torque at which a motor counts as giving its maximum; the solver rounds."""
 
 LIMIT_FORCE = 1e7
 """In N m. The engine's own is 24 kN m at 240 Hz, through which a crane's drives push any joint; the

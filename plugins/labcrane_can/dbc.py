@@ -18,7 +18,7 @@ SOURCE, ANY_SOURCE, GROUP = 0xFF, 0xFE, 0x03FFFF00
 """Source address of an extended identifier, J1939's null address, and the parameter group."""
 
 FrameKey = tuple[str, int]
-"""What tells messages apart."""
+"""Key that identifies a message."""
 
 GARBLED = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, RecursionError)
 

@@ -84,7 +84,7 @@ class Listener:
                 frame = self._look(self._bus)
                 self._watch_end(came=frame is not None)
             except (can.CanError, OSError, TypeError) as error:
-                # pyserial raises what it likes when its file is closed under it.
+                # pyserial raises various errors when its file is closed during a read.
                 self._shut()
                 self.lost = f"{self._settings.bus} is gone: {error}"
                 continue
@@ -107,7 +107,7 @@ class Listener:
         return frame
 
     def _watch_end(self, *, came: bool) -> None:
-        # python-can 4.6 does not tell that a socketcand server has hung up: it hears nothing.
+        # python-can 4.6 does not report that a socketcand server has closed: no data come.
         now = time.perf_counter()
         if came or not self._settings.bus.startswith("socketcand:"):
             self._heard = now
@@ -143,7 +143,7 @@ class Listener:
     def _shut(self) -> None:
         if self._bus is not None:
             bus, self._bus = self._bus, None
-            with contextlib.suppress(Exception):  # what was unplugged cannot be closed in order
+            with contextlib.suppress(Exception):  # an unplugged bus cannot be closed properly
                 bus.shutdown()
 
 

@@ -11,11 +11,12 @@ from labcrane_can.command_state import PanelCommands
 from labcrane_can.settings import ReplaySettings
 
 MICROSECONDS = 6
-"""Digits of a time that all formats keep; what follows differs between them."""
+"""Digits of a time that all formats keep; further digits differ between them."""
 
 
 BACK_S = 0.01
-"""How far a frame may be stamped before the one that was logged before it: drivers reorder."""
+"""Time by which a frame's timestamp may precede that of the frame before: drivers reorder
+frames."""
 
 
 def times_of(stamps: Sequence[float], *, relative: bool) -> list[float]:

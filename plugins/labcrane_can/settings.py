@@ -137,11 +137,11 @@ class CanSettings(ValveMap):
     """Whether estimated and measured flow are sent back to the panel, ten times a second."""
 
     own_node: Node = 0x80
-    """Our source address in what we send; a valve's is 0x80 and its number."""
+    """Source address of the messages that labcrane sends; a valve's is 0x80 plus its number."""
 
     most_frames_s: PositiveInt = 4000
-    """Frames a second beyond which the bus counts as flooded: about twice what 250 kbit/s
-    carry."""
+    """Frames per second above which the bus counts as flooded: about twice the capacity of 250
+    kbit/s."""
 
     @field_validator("bus")
     @classmethod

@@ -15,20 +15,21 @@ from labcrane_joystick.settings import AXES, SIDES, JoystickSettings
 from labcrane_joystick.stick import Stick, attached, pair
 
 Look = Callable[[float], float]
-"""Waits so many seconds, lets SDL take in what the sticks did, and returns the time in s."""
+"""Wait for the given seconds, let SDL process the sticks' events, and return the time in s."""
 
 HANDS = AXES[:3]
 """The axes that spring back; a slider rests anywhere."""
 
 REST_S, STEP_S = 0.5, 0.005
 OFF_CENTRE = 0.04
-"""Share of full deflection at rest beyond which a dead zone of 5 % is about to be left."""
+"""Proportion of full deflection at rest above which a stick is about to leave a dead zone of 5
+%."""
 
 STUCK = 0.5
 """Proportion of full deflection at which no working stick rests."""
 
 PUSHED = 0.6
-"""Share of full deflection that counts as pushed."""
+"""Proportion of full deflection that counts as pushed."""
 
 PUSH_S, ROUND_S, POLL_S = 15.0, 5.0, 0.001
 REACHED = 0.9

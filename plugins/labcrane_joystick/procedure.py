@@ -10,14 +10,14 @@ from labcrane_joystick.settings import AXES
 from labcrane_joystick.stick import Stick
 
 AT_REST = 100
-"""The last looks of which the median is taken for the centre: half a second."""
+"""Number of last readings whose median is the centre: half a second."""
 
 LEAST_WAY = 8192
 """Raw numbers an axis must move to each side of its centre, a quarter of its full way."""
 
 Say = Callable[[str], None]
 Look = Callable[[], None]
-"""Called before each look at the sticks: waits a little, and lets SDL take in what they did."""
+"""Called before each reading of the sticks: wait a little, and let SDL process their events."""
 
 
 def identify(sticks: Sequence[Stick], say: Say, look: Look) -> tuple[Stick, Stick]:

@@ -15,7 +15,7 @@ ENVIRONMENT = {
     # SDL would turn SIGTERM into an event, and the process could not be ended.
     "SDL_NO_SIGNAL_HANDLERS": "1",
 }
-"""What SDL and pygame read once, while they start. What the user has set stands."""
+"""Variables that SDL and pygame read at their start. The user's values take precedence."""
 
 
 def start() -> None:

@@ -17,8 +17,8 @@ LEAST_SPREAD_BIT = 0.5
 """Spread of difficulties below which slope and intercept cannot be distinguished."""
 
 LAPSE_SD, LAPSE_S = 4.0, 0.5
-"""A reaction is a lapse when it is later than the median by so many standard deviations of the
-logarithm, and by so many seconds."""
+"""A reaction is a lapse if it exceeds the median by this many standard deviations of the logarithm,
+and by this many seconds."""
 
 NAMES = ("fitts_a_s", "fitts_b_s", "learning_gain", "learning_rate")
 LOWEST = (1e-6, 0.0, 1e-4)

@@ -19,10 +19,11 @@ NEEDED = ("command_onset", "width", "target_x", "target_y", "target_z")
 """Columns of the trial table without which there is no stroke."""
 
 SLOW = 0.05
-"""Share of the peak speed below which a stroke has not begun, or has ended."""
+"""Proportion of the peak speed below which a stroke has not begun, or has ended."""
 
 MAIN = 0.5
-"""Share of the way to the target that a main stroke makes at least: others only correct."""
+"""Minimum proportion of the distance to the target that a main stroke covers: other strokes only
+correct."""
 
 LATE_TICKS = 1.5
 """Ticks by which a simulated operator's first command is later than its reaction time: one to see

@@ -17,7 +17,7 @@ NOT_ASKED, TO_TOUCH, TOUCHED = -1.0, 0.0, 1.0
 """Whether something is to be touched, and was."""
 
 OPEN_WITHIN = 0.1
-"""How near the jaws' opening must come to what a goal asks, as a share of their range."""
+"""Tolerance of the jaws' opening for a goal, as a proportion of their range."""
 
 
 def check_goals(name: str, scene: Scene, state: Layout) -> None:
@@ -82,7 +82,7 @@ class GoalSequence:
         thing = self._placed[what]
         pieces = [each for each in thing.parts if each.name == part]
         segment = f"{what}.{part}"
-        # A segment is where its first part is; a thing of one piece where its very first one is.
+        # A segment's position is that of its first part; a rigid thing's that of its first part.
         first = pieces[0] if segment in self._turns else thing.parts[0]
         moves = segment if segment in self._turns else what
         if moves in self._turns:

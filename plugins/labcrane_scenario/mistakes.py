@@ -49,10 +49,10 @@ KINDS = {
     "overload_min": "times that a joint was overloaded in its negative direction",
     "drop": "times that something slipped out of the jaws and fell, or was let go from too high",
 }
-"""Mistakes of these kinds are counted, each for itself; what counts as one."""
+"""Kinds of mistakes, each counted separately, and their definitions."""
 
 ENDING = tuple(kind for kind in KINDS if kind != "drop")
-"""Of these, too many end a run: those that the paper counts. Others are reported beside them."""
+"""Kinds of which too many end a run: those that the paper counts. Other kinds are only reported."""
 
 
 @dataclass

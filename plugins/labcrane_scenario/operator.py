@@ -20,13 +20,13 @@ from labcrane_scenario.lapses import Lapses
 from labcrane_scenario.settings import PanelOperatorSettings
 
 NEAR = 0.6
-"""Share of a goal's radius within which the tip is left alone while the jaws move."""
+"""Proportion of a goal's radius within which the tip is not corrected while the jaws move."""
 
 GENTLE = 3.0
-"""Radii of a goal from its middle within which something is to be touched gently."""
+"""Distance from a goal, in its radii, within which a thing is touched gently."""
 
 CLOSE_RAD = 0.02
-"""The jaws are as far open as they should be when they come this close to it."""
+"""Tolerance of the jaws' opening, in rad."""
 
 
 class ScenarioOperator(InputDevice):

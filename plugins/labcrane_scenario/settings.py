@@ -60,45 +60,46 @@ class ScenarioSettings(Settings):
 
 
 class ErrorSettings(Settings):
-    """How a simulated operator errs. All is drawn from the participant's and the trial's seed."""
+    """Errors of a simulated operator, sampled with the seeds of participant and trial."""
 
     bumps_per_min: Annotated[NonNegativeFloat, Usual(0.001, 100.0)] = 0.0
-    """How often it bumps into something, in a minute of movement: it lets the arm sink."""
+    """Collisions per minute of movement: the operator lets the arm sink."""
 
     bump_s: PositiveFloat = 1.0
-    """For how long it does so then, in seconds."""
+    """Duration of the sinking, in seconds."""
 
     bump_m_s: PositiveFloat = 0.15
-    """How fast the tip sinks then, in m/s."""
+    """Speed at which the tip sinks then, in m/s."""
 
     over_grip: float = Field(default=0.0, ge=0.0, le=1.0)
-    """Probability of pressing on after a grip has formed, once for each grip."""
+    """Probability, once for each grip, that the operator keeps pressing after the grip has
+    formed."""
 
     over_grip_s: PositiveFloat = 3.0
-    """For how long it presses on then, in seconds."""
+    """Time in seconds for which the operator keeps pressing then."""
 
     misses: float = Field(default=0.0, ge=0.0, le=1.0)
-    """Probability of overlooking a deformity, in a trial."""
+    """Probability, for each trial, of overlooking a deformity."""
 
     false_reports: float = Field(default=0.0, ge=0.0, le=1.0)
-    """Probability of reporting one where there is none, in a trial: at its first goal."""
+    """Probability, for each trial without a deformity, of reporting one at the first goal."""
 
     fatigue_per_min: Annotated[NonNegativeFloat, Usual(1e-5, 1.0)] = 0.0
-    """Share of its speed that is lost in a minute of the session, and by which it errs more often:
-    after t minutes it has exp(-fatigue t) of its speed, and 1 / that of its rates."""
+    """Loss of speed per minute of the session, which also raises the rates of errors: after t
+    minutes, the speed is multiplied by exp(-fatigue t), and the rates are divided by it."""
 
 
 class PanelOperatorSettings(Settings):
-    """A simulated operator at a control panel. Its values are ours, and never a result."""
+    """A simulated operator at a control panel. Its values are assumed, not measured."""
 
     gain_per_s: PositiveFloat = 1.2
     """Tip speed per distance from the goal, in 1/s."""
 
     speed_m_s: PositiveFloat = 0.25
-    """Largest tip speed asked for, in m/s."""
+    """Largest commanded tip speed, in m/s."""
 
     touch_m_s: PositiveFloat = 0.03
-    """Largest tip speed where something is to be touched, in m/s."""
+    """Largest tip speed when a thing is to be touched, in m/s."""
 
     reaction_s: NonNegativeFloat = 0.4
     """Time from a new goal to the first movement, in seconds."""
@@ -107,21 +108,22 @@ class PanelOperatorSettings(Settings):
     """The joint that opens the jaws."""
 
     signal: float = Field(default=0.5, gt=0.0, le=1.0)
-    """Share of full signal with which the jaws are moved."""
+    """Proportion of the full signal with which the jaws are moved."""
 
     axes: dict[JointName, InputAxis] = Field(default={})
-    """Axes of the input that it stands for, by the joint that each moves (``{jaws: -right.x}``),
-    with a minus where the scheme has one. A joint left out has its own axis: ``valve.jaws``."""
+    """Axes of the input that the operator replaces, by the joint that each moves (``{jaws:
+    -right.x}``), with a minus if the scheme has one. A joint that is not listed has the axis
+    ``valve.<joint>``."""
 
     button: ButtonName | None = None
-    """A button of the input that it has too, like the device it stands for (``float.base`` of a
-    panel), with which it reports a deformity once it sees one."""
+    """Button of the replaced input (``float.base`` of a panel), with which the operator reports a
+    deformity when it sees one."""
 
     sees_m: PositiveFloat = 0.5
-    """How near the tip must come to a deformity for it to be seen, in metres."""
+    """Distance in metres from the tip within which the operator sees a deformity."""
 
     errs: ErrorSettings | None = None
-    """How it errs, so that counts and stop rules can be rehearsed; never, by default."""
+    """Errors of the operator, to rehearse counts and stop rules; none by default."""
 
     def provides(self, machine: Machine) -> Names:
         button = [self.button] if self.button else []

@@ -21,7 +21,7 @@ HEAD = 9
     RESOLVED, JOINTS, STICKS, EDGE, REST, LINEAR, EXPO, STRETCH, STEEPNESS, STRAIGHT, WIDTH, HOLDS,
     DAMPING2, THRESHOLD2, SPEED, BASE, STRIDE, TABLES,
 ) = range(18)  # fmt: skip
-"""Of a block: whether it is resolved rate; then its numbers; its tables follow."""
+"""Layout of a block: whether it is resolved rate, then its numbers, then its tables."""
 (
     AXIS,
     FACTOR,

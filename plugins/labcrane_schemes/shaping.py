@@ -3,7 +3,7 @@
 import math
 
 ROUNDING = 1e-16
-"""Share of the cube that is lost in rounding, and whose root would overflow."""
+"""Cubic weight that is lost in rounding, and whose root would overflow."""
 
 
 class Shaping:

@@ -24,14 +24,14 @@ SHARES = frozenset({"normalized", "normalised", "norm", "1", "ratio"})
 PIXELS = frozenset({"pixel", "pixels", "px"})
 
 PUPIL_MM = (1.2, 9.5)
-"""Diameters that there are; 2 to 8 mm in the light of rooms (Watson and Yellott 2012, Journal of
-Vision 12(10), 12)."""
+"""Range of pupil diameters; 2 to 8 mm in room light (Watson and Yellott 2012, Journal of Vision
+12(10), 12)."""
 
 PUPIL_UNIT_MM = (0.05, 40.0)
 """Range of pupil diameters; a value outside means that the unit is wrong."""
 
 JUMP_MM = 1.0
-"""No pupil changes by so much from one sample to the next; a blink's edge does now and then."""
+"""Change between samples that a pupil does not make; the edge of a blink sometimes does."""
 
 LOST = 0.8
 """Fraction of a window without gaze: a blink takes 0.15 to 0.4 s."""
@@ -100,7 +100,7 @@ class GazeMonitor(WindowedMonitor):
             none |= (across == down) & ((across == 0.0) | (across == -1.0))  # what trackers write
             for at in self._sure:
                 none |= ~(window[:, at] >= self._settings.confidence)
-            if self._units[x] in SHARES:  # far beside the screen, but not in another unit
+            if self._units[x] in SHARES:  # far off the screen, but not in another unit
                 none |= (np.abs(across - 0.5) > 1.5) & (np.abs(across) < 5.0)  # noqa: PLR2004
         seen = across[~none]
         frozen = len(seen) > 1 and bool(

@@ -13,7 +13,7 @@ SPECIAL = frozenset(
     {"eeg", "ecg", "ekg", "emg", "gaze", "force", "joystick", "joysticks", "stick", "sticks"}
     | {"axes", "gamepad", "marker", "markers", "event", "events", "audio", "videoraw"}
 )
-"""Types that a monitor of their own knows, or that may stand still for long."""
+"""Types that have their own monitor, or that may be constant for long."""
 
 NEED = {"no values": 6, "flat line": 6, "railing": 6, "wrong unit": 6}
 MOVED = 20

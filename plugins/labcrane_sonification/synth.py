@@ -108,7 +108,7 @@ class Synth:
         self._pitch = pyo.SigTo(start, time=ramp, init=start)
         self._levels = [pyo.SigTo(0.0, time=ramp, init=0.0) for _ in range(count)]
         self._sides = [pyo.SigTo(float(gain), time=ramp, init=float(gain)) for gain in gains(0.0)]
-        # Objects that nobody refers to fall silent.
+        # pyo objects without a reference fall silent.
         self._partials = [
             pyo.Sine(freq=self._pitch * (n + 1), mul=level) for n, level in enumerate(self._levels)
         ]

@@ -70,7 +70,7 @@ def tone(settings: SonificationSettings, distance: float, aside: float, inside_s
 
 
 STEPS = 400
-"""Distances at which the softest and the loudest tone are looked for."""
+"""Number of distances at which the softest and the loudest tone are searched for."""
 
 
 def loudest(settings: SonificationSettings) -> tuple[float, float]:
@@ -78,7 +78,7 @@ def loudest(settings: SonificationSettings) -> tuple[float, float]:
 
     No sample is larger, however the partials lie to each other; ``weighting`` can only lower it.
     """
-    with np.errstate(all="ignore"):  # of pitches that nobody hears, and that a check asks about
+    with np.errstate(all="ignore"):  # of inaudible pitches, about which a check warns
         if not softest(settings.pitch_hz, settings.overtones) > 0.0:
             return max(settings.level) * sum_of_partials(max(settings.overtones)), 0.0
         ways: Sequence[float] = np.linspace(0.0, settings.far, STEPS + 1).tolist()

@@ -18,7 +18,7 @@ from labcrane_tables.settings import PsychDsSettings
 from labcrane_tables.tables import joined, write_csv
 
 OTHERS = ("questionnaires", "scores")
-"""Tables beside that of movements."""
+"""Tables in addition to that of movements."""
 
 
 class PsychDs(Exporter):
@@ -52,7 +52,7 @@ class PsychDs(Exporter):
                 write_csv(joined([own]), folder / "data" / name)
             for what, answers in zip(OTHERS, (answers_of, scores_of), strict=True):
                 told = answers(participant)
-                if told.empty:  # what is in no file is not described either
+                if told.empty:  # only the columns in a file are described
                     continue
                 for row in book[book["table"] == what].itertuples(index=False):
                     name = str(row.column)

@@ -14,10 +14,11 @@ DISC_DEG, DOT_DEG = 0.6, 0.2
 that paper."""
 
 DISC = 0.02
-"""Diameter of the disc as a share of the picture's height, where nobody says how far the eye is."""
+"""Diameter of the disc as a proportion of the picture's height, if the viewing distance is
+unknown."""
 
 GREY = (0.5, 0.5, 0.5, 1.0)
-"""Colour of everything else: pupils are as wide as in the middle of what is seen otherwise."""
+"""Colour of the background: pupils are as wide as with the mean brightness of other pictures."""
 
 BLACK, LIGHT = (0.0, 0.0, 0.0, 1.0), GREY
 

@@ -12,7 +12,7 @@ ABOVE = 2.2
 """Metres above a target, and between two of them, through which the tip is carried."""
 
 MARGIN = 1.06
-"""Of the picture to what it must hold."""
+"""Margin of the picture around the points that it must show."""
 
 WIDEST_DEG = 120.0
 """Horizontal field of view beyond which a flat picture is stretched at its edges."""

@@ -33,7 +33,7 @@ FIRST_BITS = ((1, 1), (2, 1), (3, 1), (4, 1), (5, 1), (2, 2), (3, 2), (4, 2), (3
 the same turned by right angles, so that a square seen from the side has its code turned as well."""
 
 ORDER = 60
-"""Drawn last of all: a picture that is dimmed while the session stands still keeps them."""
+"""Drawn last, so that the markers stay visible when the picture is dimmed in a pause."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ LINE = 0.034
 """Height of a line of text, as a share of the window's height."""
 
 NOTICE = 0.05
-"""Height of a line of what is to be read now, which nobody must miss; not below that of text."""
+"""Height of a line of instructions, which operators must not miss; not below that of other text."""
 
 CARD = (0.05, 0.06, 0.07, 0.75)
 """Colour and opacity of the ground of text: on white, too, the contrast is 7 to 1 (WCAG, AAA)."""
@@ -21,7 +21,7 @@ WIDE, TALL = 0.8, 0.9
 """Longest line of it, and most that all lines take, as shares of the window's width and height."""
 
 CURTAIN = (0.05, 0.06, 0.07, 0.75)
-"""Colour and opacity of what dims the picture while the session stands still."""
+"""Colour and opacity of the layer that dims the picture while the session is paused or stopped."""
 
 SPREAD, HIGH = 0.8, 0.25
 """Most that its words take, as shares of the window's width and, for a line, of its height."""

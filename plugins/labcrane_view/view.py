@@ -36,7 +36,7 @@ PREVIEW_S = 0.5
 
 SPOT, SPOT_COLOUR = 0.22, (0.02, 0.02, 0.02, 1.0)
 PLUMB, LINE_COLOUR = 0.012, (0.95, 0.95, 0.95, 1.0)
-"""Radii in metres, and colours, of what tells how high the tip is."""
+"""Radii in metres, and colours, of the cues for the height of the tip."""
 
 STEM = (0.75, 0.75, 0.72, 1.0)
 
@@ -50,7 +50,7 @@ class View(Feedback):
         Signal("flip.time", "s"),  # the picture is handed to the screen; the photodiode knows more
         Signal("patch", "1"),
         Signal("refresh.missed", "1"),  # refreshes that showed the picture before once more
-        Signal("monitors.lost", "1"),  # of those that it fills: nobody sees what they would show
+        Signal("monitors.lost", "1"),  # of those that it fills: their pictures are not visible
     )
 
     def __init__(self, settings: ViewSettings, machine: Machine) -> None:

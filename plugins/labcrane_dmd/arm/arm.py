@@ -21,7 +21,7 @@ from labcrane_dmd.model.model_file import load
 ROUNDING_S = 1e-9
 
 SLACK_RAD = 2e-3
-"""How far beyond its limit the engine lets a joint stand; more is a mistake."""
+"""Maximum by which the engine may let a joint exceed its limit; more is an error."""
 
 
 class DmdArm(Dynamics):
@@ -71,7 +71,7 @@ class DmdArm(Dynamics):
 
     def begin_trial(self, trial: Trial) -> None:
         self._trial = trial
-        # A start pose comes with a reset of its own; until then the arm may stand in the new scene.
+        # A start pose has its own reset; until then the arm may overlap the new scene.
         if self._scenes and trial.planned.start_pose is None:
             self.reset(self._pose)
 

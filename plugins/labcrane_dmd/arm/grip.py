@@ -18,7 +18,8 @@ NEAR_M = 0.01
 """A thing has left the jaws when neither of them is nearer to it than this, in metres."""
 
 RAYS, PAST_M = 16, 0.005
-"""How often a ray that met the arm or what is held goes on, and how far under it, in metres."""
+"""Number of times that a ray continues below the arm or the held thing, and the distance below it,
+in metres."""
 
 
 @dataclass

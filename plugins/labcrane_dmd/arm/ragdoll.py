@@ -14,7 +14,8 @@ BETWEEN_KG = 0.02
 """Mass of a link between two hinges; the segment behind them has that much less."""
 
 BETWEEN_M = 0.05
-"""Size from which it has its inertia: with less, the hinges' accelerations cannot be told apart."""
+"""Size from which the link between two hinges has its inertia: with less, the hinges' accelerations
+are indistinguishable."""
 
 FAST = 20.0
 """Speed in rad/s that URDF asks for; the engine does not keep to it."""

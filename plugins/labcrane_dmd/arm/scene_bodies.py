@@ -13,7 +13,7 @@ from labcrane_dmd.arm.engine import pybullet
 from labcrane_dmd.arm.ragdoll import ragdoll
 
 OVERLAP_M = 0.002
-"""Depth, in metres, to which two things may stand in each other at the start."""
+"""Depth, in metres, by which two things may overlap at the start."""
 
 ROLLING = 0.002
 """Rolling friction in metres: without it a ball never comes to rest."""
@@ -116,7 +116,7 @@ def _add_jointed(placed: PlacedObject, client: int) -> StandingBody:
     _surface(placed, body, len(links), client)
     for name, hinge in doll.hinges.items():
         pybullet.changeDynamics(body, links[name], jointLimitForce=STOP_NM, physicsClientId=client)
-        # A motor that wants to stand still and has little torque is friction that is dry.
+        # A motor with target speed 0 and little torque acts as dry friction.
         pybullet.setJointMotorControl2(
             body,
             links[name],

@@ -22,8 +22,8 @@ class ValveSettings(Settings):
     """The operator's axes go to the valves unchanged."""
 
     map: Annotated[dict[JointName, AxisName], Once()] = Field(default_factory=dict)
-    """Which axis opens which joint's valve; joints that are not named here have the axis
-    ``valve.<joint>``, which is what a control panel gives."""
+    """Axis that opens each joint's valve. A joint that is not listed has the axis
+    ``valve.<joint>``, which a control panel provides."""
 
     model: StudyPath | None = None
     """The arm's Dynamic Model Description, for simulated operators: a practised hand knows how

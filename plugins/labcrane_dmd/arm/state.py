@@ -46,7 +46,7 @@ and still at the jaws; whether what came loose last slipped; how many things hel
 
 
 NOWHERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-"""Pose of what is not there."""
+"""Pose of an absent thing."""
 
 
 def scene_parts(scenes: Iterable[Scene]) -> Parts:

@@ -93,7 +93,7 @@ class World:
             self.close()
             raise
         ground = add_ground(client)
-        # The column stands on the ground; a contact there would only work against the slewing.
+        # The column is on the ground; a contact there would only resist the slewing.
         pybullet.setCollisionFilterPair(self.arm, ground, 0, -1, 0, physicsClientId=client)
         self.contacts = Contacts(self.things, self.arm, ground, client, ticks)
         if settings.jaws is not None:

@@ -19,7 +19,8 @@ LONGER = 1.1
 """A slower arm is waited for this much longer than the recorded one needed."""
 
 STILL_RAD = 1e-9
-"""A joint that moves less in a step stands: what is left at an end stop is rounding."""
+"""Movement per step below which a joint counts as at rest: what remains at an end stop is
+rounding."""
 
 STANDS_S = 1.5
 """How long an arm that has arrived is watched, as the recordings do."""
@@ -176,7 +177,7 @@ def _level(
     run_up = direction.dead_time + LAGS * direction.lag
     real = curve_at(recording, signal, run_up)
     driven = curve_at(SegmentRecording(segment.name, "", "", (run,)), signal, run_up)
-    if real is None or driven is None:  # one of them stood still, and counts as that
+    if real is None or driven is None:  # one of them did not move, and counts as that
         other = real or driven
         angle = np.linspace(*segment.limits, 20) if other is None else other.angle
         recorded = np.zeros_like(angle) if real is None else real.speed

@@ -29,7 +29,8 @@ FIND_S = 10.0
 BUFFER_S = 60
 
 BACK_S = 0.01
-"""How far a frame of a log may be stamped before the one above it, in s: drivers reorder."""
+"""Time in s by which a frame's timestamp may precede that of the frame before: drivers reorder
+frames."""
 
 CLOCK_S = 5.0
 """How often the offset of the other computer's clock is asked for."""

@@ -19,7 +19,7 @@ FIRST_RUN_UP_S = 0.8
 """Cut in the first pass, before dead time and lag are known."""
 
 LAGS = 6.0
-"""Run-up in lags: what is missing of the speed by then is 0.25 %."""
+"""Length of the run-up in lags; after it, 0.25 % of the speed is missing."""
 
 WHOLE = 0.8
 """A layer that covers this share of the joint's range, or more, lacks only its run-up."""
@@ -97,7 +97,7 @@ def _direction(
 
 def _check(recording: SegmentRecording, signals: Sequence[int]) -> None:
     stood: JointRun | None = None
-    for signal in reversed(signals):  # from the strongest on: only the weakest may stand still
+    for signal in reversed(signals):  # from the strongest: only the weakest may not move the joint
         runs = recording.at(signal)
         if not runs:
             there = ", ".join(f"{run.signal:g}" for run in recording.runs)

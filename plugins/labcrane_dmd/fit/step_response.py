@@ -16,7 +16,7 @@ LONGEST_S = 0.6
 COARSE_S, FINE_S = 0.02, 0.002
 
 SIGNALS, ANGLES = 26, 80
-"""Points of the table in which speeds are looked up; between them they are linear."""
+"""Number of points in the table of speeds; speeds between them are interpolated linearly."""
 
 
 def identify(

@@ -105,7 +105,7 @@ def validation_signals(model: Model, recording: SegmentRecording) -> tuple[int, 
 def _level(segment: SegmentModel, recording: SegmentRecording, signal: int) -> Level:
     direction = segment.direction(signal)
     curve = curve_at(recording, signal, direction.dead_time + LAGS * direction.lag)
-    if curve is None:  # the joint stood still: the model should say so anywhere
+    if curve is None:  # the joint did not move: the model should predict this everywhere
         angle = np.linspace(*segment.limits, 20)
         recorded = np.zeros_like(angle)
     else:

@@ -41,7 +41,7 @@ class LayerText(Settings):
     """Whether these are, but for the run-up, all angles of the joint."""
 
     speed_deg_s: tuple[float, ...]
-    """Coefficients of 1, x, x², ...; none when the joint stands still at this signal."""
+    """Coefficients of 1, x, x², ...; none if the joint does not move at this signal."""
 
     @model_validator(mode="after")
     def _covers_something(self) -> "LayerText":
@@ -56,7 +56,7 @@ class DirectionText(Settings):
     """One direction as the file has it."""
 
     dead_band: NonNegativeFloat
-    """Size of the signal up to which the joint stands still."""
+    """Size of the signal up to which the joint does not move."""
 
     dead_time_s: NonNegativeFloat
     """From the step of the signal until the valve begins to open, in seconds."""

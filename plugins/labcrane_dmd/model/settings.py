@@ -18,10 +18,11 @@ class FitSettings(Settings):
     """Signals whose recordings become layers, in both directions; 0 is zero."""
 
     validation: tuple[PositiveInt, ...] = (20, 60, 100, 140, 180, 220)
-    """Signals whose recordings are never looked at by the fit, in both directions."""
+    """Signals whose recordings the fit does not use, in both directions."""
 
     edge: tuple[PositiveInt, ...] = (10, 30, 50)
-    """Signals from whose recordings, beside the layers', the edge of the dead band is found."""
+    """Signals whose recordings, in addition to those of the layers, locate the edge of the dead
+    band."""
 
     dead_band: DeadBand = "found"
     """``found``: the edge of the dead band is found from recordings at ``edge`` and ``levels``, and

@@ -9,7 +9,7 @@ from labcrane_view.screen.placement import Piece
 from labcrane_view.screen.window import BAKED, Window
 
 LIT, SHADED = core.LVector2(1.0, 1.0), core.LVector2(0.0, 1.0)
-"""How the sun shines: as far as the scenery's own shadows let it, and not at all."""
+"""Sunlight in the two pictures: as the scenery's own shadows let it through, and none."""
 
 
 class Backdrop:

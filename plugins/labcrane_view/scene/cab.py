@@ -9,13 +9,13 @@ PILLAR_M, EDGE_M = 0.038, 0.05
 """Radii of the pillars, and of roof and sill."""
 
 INSET, LOW, HIGH = 0.90, 0.93, 0.95
-"""Where they stand, as shares of half the picture: of its width, and of its height."""
+"""Positions of the pillars, as proportions of half the picture's width and height."""
 
 LEAN_M = 0.10
-"""By how much the pillars stand farther apart at the sill."""
+"""Additional distance between the pillars at the sill."""
 
 CLEAR = 0.80
-"""Share of half the picture, about its middle, in which nothing of the cab is."""
+"""Proportion of half the picture, about its middle, that the cab does not hide."""
 
 
 def window(half_width: float, half_height: float) -> Mesh:

@@ -5,7 +5,7 @@ uniform struct p3d_LightSourceParameters {
   vec4 color; vec4 position; sampler2DShadow shadowMap; mat4 shadowViewMatrix;
 } p3d_LightSource[2];
 """
-"""The sun twice: with the shadows of what stands still, drawn once, and of what moves."""
+"""The sun twice: with the shadows of static objects, drawn once, and of moving objects."""
 
 VERTEX = (
     """#version 330
@@ -208,7 +208,7 @@ void main() {
 }
 """
 )
-"""The sheet that shows the scenery as it was drawn, with the shadows of what moves."""
+"""The sheet that shows the drawn scenery with the shadows of moving objects."""
 
 
 def backdrop(taps: int) -> str:

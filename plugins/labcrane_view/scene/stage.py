@@ -20,8 +20,8 @@ from labcrane_view.scene.rams import Ram, hoses, rams
 from labcrane_view.scene.things import pieces
 
 SHADOWS, STILL = core.BitMask32.bit(5), core.BitMask32.bit(6)
-"""Cameras of the shadow maps, of what moves and of what stands still: neither sees what glows or is
-transparent."""
+"""Cameras of the shadow maps, of moving and of static objects; neither sees glowing or transparent
+objects."""
 
 SCENERY, MOVING = core.BitMask32.bit(7), core.BitMask32.range(8, 23)
 """Cameras that see the scenery alone, and those, a bit each, that see all but it."""
@@ -30,7 +30,8 @@ FULL = 4
 """Looks at a map of shadows for a soft edge."""
 
 STILL_PICTURES = 3
-"""How often the shadows of what stands still are drawn: textures are there from the second on."""
+"""Number of times that the shadows of static objects are drawn: textures are loaded from the second
+on."""
 
 PAINT = ((0.13, 0.13, 0.14, 1.0), (0.90, 0.66, 0.07, 1.0), (0.12, 0.38, 0.17, 1.0))
 """Colours of the frames: the foot, the column, and everything behind."""

@@ -17,7 +17,7 @@ Place = tuple[Pixels, Pixels]
 """Upper left corner and size, in pixels."""
 
 LEAST = (160, 90)
-"""Width and height, in pixels, below which nobody sees anything in a window."""
+"""Width and height, in pixels, below which a window is too small to see anything."""
 
 LOOK_S = 1.0
 """Between two looks at which monitors there are, in seconds."""
@@ -276,7 +276,7 @@ class WindowPlacer:
         try:
             self._seen = monitors()
         except DeviceError:
-            return  # the server is busy changing them, or gone: the next look tells
+            return  # the server is changing them, or gone: the next query shows which
 
     def close(self) -> None:
         """Watch no more."""

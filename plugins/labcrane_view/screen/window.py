@@ -29,15 +29,15 @@ textures-power-2 none
 
 
 BACK_BUFFERS = 1
-"""A picture is drawn where nobody sees it, and shown whole; without one the X server shows what is
-drawn so far."""
+"""The picture is drawn off-screen and shown complete; otherwise the X server would show partial
+pictures."""
 
 SHARP = 64
-"""Pixels of a line of text as it is kept: larger text is blurred a little."""
+"""Stored height of a line of text in pixels: larger text is slightly blurred."""
 
 BAKED, SEEN, TURNED = -8, -7, -5
-"""When backdrops, cameras' pictures and the whole window turned over are drawn: after the shadows
-(Panda3D's -10), before what shows them (0)."""
+"""Sort order of backdrops, cameras' pictures and the flipped window: after the shadows (Panda3D's
+-10), before the regions that show them (0)."""
 
 
 @dataclass(frozen=True)
