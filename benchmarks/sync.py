@@ -95,7 +95,7 @@ def main() -> int:
     parser.add_argument("--json", action="store_true", help="end with all rows in one line")
     options = parser.parse_args()
     logging.getLogger("pyxdf").setLevel(logging.ERROR)  # it finds the irregular streams odd
-    found = unkind(options.draws, options.page) if options.draws else []
+    found = misbehaving(options.draws, options.page) if options.draws else []
     with tempfile.TemporaryDirectory(prefix="labcrane-sync-") as name:
         folder = Path(name)
         config = folder / "lsl_api.cfg"
@@ -114,7 +114,7 @@ def main() -> int:
     return 1 if beyond else 0
 
 
-def unkind(draws: int, page: Path | None) -> list[Row]:
+def misbehaving(draws: int, page: Path | None) -> list[Row]:
     """Print a line for each misbehaving device; return its rows and write the table to ``page``."""
     from streams.strangers import ALL  # noqa: PLC0415
     from streams.unkind_score import score, shortcomings, table_line  # noqa: PLC0415 - the path
@@ -181,8 +181,22 @@ def promises(every: Sequence["Score"]) -> list[Row]:
     allowed = [100.0 * (1.0 - share) for share in (COVERED, NAMED)]
     document = "docs/accuracy.md"
     return [
-        Row("sync", "unkind draws that break a promise, and one", 1.0 + broken, 1.0, "none", 1.0),
-        Row("sync", "unkind devices worse than by pyxdf, and one", 1.0 + worse, 1.0, "none", 1.0),
+        Row(
+            "sync",
+            "draws of misbehaving devices that miss a target, and one",
+            1.0 + broken,
+            1.0,
+            "none",
+            1.0,
+        ),
+        Row(
+            "sync",
+            "misbehaving devices worse than by pyxdf, and one",
+            1.0 + worse,
+            1.0,
+            "none",
+            1.0,
+        ),
         Row("sync", "samples beyond what is stated, %", uncovered, allowed[0], document, 1.0),
         Row("sync", "worst fault: wrong or left out, %", unnamed, allowed[1], document, 1.0),
     ]

@@ -240,10 +240,13 @@ def promised_of(**changed: object) -> list[str]:
     ("changed", "missed"),
     [
         ({}, []),
-        ({"p95": 0.3, "usual": 0.6}, ["unkind draws that break a promise, and one is 2"]),
+        (
+            {"p95": 0.3, "usual": 0.6},
+            ["draws of misbehaving devices that miss a target, and one is 2"],
+        ),
         (
             {"p95": 9.9, "usual": 0.1, "untouched": 10.0, "clean": False},
-            ["unkind devices worse than by pyxdf, and one is 2"],
+            ["misbehaving devices worse than by pyxdf, and one is 2"],
         ),
         ({"cover": 0.95, "samples": 9000}, ["samples beyond what is stated, % is 2.5"]),
         ({"named": frozenset()}, ["worst fault: wrong or left out, % is 10"]),

@@ -67,7 +67,7 @@ class _Line:
         self.queue.extend((self.codes[name], frame.tick.due) for name in wanted)
 
     @property
-    def owes(self) -> bool:
+    def awaits_echoes(self) -> bool:
         """Whether echoes of what was sent are still to come."""
         return self.answers and bool(self.waiting)
 
@@ -148,11 +148,11 @@ class Triggers:
     def finish(self) -> None:
         """Wait a moment for what is still under way, after the last tick."""
         until = time.perf_counter() + LAST_S
-        while owing := [each for each in self._lines if each.queue or each.owes]:
+        while waiting := [each for each in self._lines if each.queue or each.awaits_echoes]:
             if time.perf_counter() >= until:
                 break
             time.sleep(BETWEEN_S)
-            for line in owing:
+            for line in waiting:
                 self._send(line, time.perf_counter())
         for line in self._lines:
             self._leave_out(line, time.perf_counter(), -math.inf)

@@ -261,12 +261,14 @@ def _followed(time: FloatArray, sampling: Sampling) -> _Followed:
     A phase that slides along the grid of polls is none of the sampler's.
     """
     if sampling.received is None or not sampling.received.polled:
-        evened, doubt = time.copy(), np.full(len(time), sampling.noise_s)
+        dejittered, doubt = time.copy(), np.full(len(time), sampling.noise_s)
         for start, stop in itertools.pairwise((0, *sampling.breaks, len(time))):
             if stop - start >= LONG_RUN:  # the length of a hole is not dejittered
                 part = slice(start, stop)
-                evened[part], doubt[part] = follow_sample_clock(time[part], sampling.index[part])
-        return evened, doubt
+                dejittered[part], doubt[part] = follow_sample_clock(
+                    time[part], sampling.index[part]
+                )
+        return dejittered, doubt
     line = even_line(time, sampling.index)
     return line, np.full(len(time), sampling.received.strayed_s)
 

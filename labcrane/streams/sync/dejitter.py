@@ -121,14 +121,14 @@ def runs(times: FloatArray, index: FloatArray) -> list[tuple[int, int]]:
     return list(itertools.pairwise(bounds))
 
 
-def left_open(times: FloatArray, evened: FloatArray, way: Dejitter) -> FloatArray:
+def left_open(times: FloatArray, dejittered: FloatArray, way: Dejitter) -> FloatArray:
     """Return how far lines that were asked for may be off, in seconds, shape ``(n,)``.
 
     The soonest of a second's samples, or the middle one, would lie on them if they were right; of
     samples that are rarer, each. What lies apart was delayed for so long, or the lines are wrong,
     as after samples that were lost uncounted: nothing tells which.
     """
-    apart, span = times - evened, float(np.ptp(times))
+    apart, span = times - dejittered, float(np.ptp(times))
     count = min(max(int(span / SOON_S), 1), len(times))
     blocks = np.array_split(np.arange(len(times)), count)
     soonest = 0.0 if way is Dejitter.ENVELOPE else 0.5
