@@ -285,5 +285,6 @@ PARSERS = {
     "toml": tomllib.loads,
     "json": json.loads,
     "xml": ElementTree.fromstring,
+    "regex": lambda text: [re.compile(line) for line in text.splitlines()],
 }
 """What makes sure that a block is what its language says."""

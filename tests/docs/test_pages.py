@@ -8,7 +8,7 @@ from docs.bare_machine import commands
 from docs.page import PAGES, ROOT, Reader, blocks
 from needs import missing, need
 
-RUN = {"python", "sh", "r", "octave", "matlab", "yaml", "toml", "json", "xml", ""}
+RUN = {"python", "sh", "r", "octave", "matlab", "yaml", "toml", "json", "xml", "regex", ""}
 """Languages of blocks; one without a language lists files that are there."""
 
 FIRST = {"README.md", "first-study.md"}
