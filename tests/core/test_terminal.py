@@ -176,7 +176,7 @@ def test_a_session_that_nobody_can_start_is_kept_to_be_gone_on_with(folder: Path
         timeout=120,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert "go on with: labcrane resume" in " ".join(done.stdout.split())
+    assert "to continue, run: labcrane resume" in " ".join(done.stdout.split())
     session = open_recording(folder / "data" / "P002-PILOT" / "P002-PILOT.h5").session(1)
     assert session.events["data"].tolist()[-1]["reason"] == "by order"
 

@@ -66,7 +66,7 @@ def test_a_report_is_of_those_who_can_be_used_and_says_who_cannot(
     assert "2 recordings cannot be used: P004, P005" in capsys.readouterr().out
     page = (out / "report.html").read_text()
     assert "P004" in page
-    assert "holds no frames" in page
+    assert "contains no frames" in page
     assert (out / "participants" / "P003.html").is_file()
 
 

@@ -60,7 +60,7 @@ def test_a_session_is_led_by_keys_alone_and_every_state_is_for_everybody(  # noq
         shown(browser, "now", "Questionnaire")
         check(browser, "questionnaire")
         keys(browser, "s")
-        shown(browser, "sure-asks", "Skip what runs now?")
+        shown(browser, "sure-asks", "Skip this trial, break or questionnaire?")
         check(browser, "a question before skipping")
         webdriver.ActionChains(browser).send_keys(Keys.ENTER).perform()
         shown(browser, "now", "Break")

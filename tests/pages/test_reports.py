@@ -81,7 +81,7 @@ def test_a_deformity_is_reported_from_either_page_and_nothing_else_is(
         shown(browser, "stage", "trial")
         # The test as it stands, while it runs.
         shown(browser, "performance", "test in lying, running")
-        shown(browser, "performance", "no indicator: no reference time of this scenario")
+        shown(browser, "performance", "no indicator: this scenario has no reference time")
         assert ask(room, "POST", "/orders/report", cookie, "fire")[0] == 202
         shown(browser, "events", "this task asks for reports of deformity")
         browser.switch_to.window(participant)

@@ -70,7 +70,7 @@ def test_stamps_that_go_back_while_offsets_go_on_state_it(seed: int, right: str)
     assert np.mean(np.abs(corrected.time - drawn.truth) <= corrected.error) >= 0.99
     told = judge_quality(corrected.quality, rate, len(times), Limits())
     assert any(each.verdict is Verdict.FAIL and "may be off by" in each.text for each in told)
-    assert any("placed before one that came earlier" in each.text for each in told)
+    assert any("placed before one that arrived earlier" in each.text for each in told)
     assert corrected.quality.rate_hz == pytest.approx(rate, rel=1e-3)
 
 

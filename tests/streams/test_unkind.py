@@ -99,7 +99,7 @@ def test_delays_that_nothing_tells_from_uneven_samples_do_not_pass(seed: int) ->
     corrected = correct(drawn.raw, drawn.treatment)
     assert np.abs(corrected.time - drawn.truth).max() > 1e-3
     told = judge_quality(corrected.quality, 250.0, len(drawn.truth), Limits())
-    assert any("its samples are uneven, or late by as much" in each.text for each in told)
+    assert any("its samples are irregular, or late by as much" in each.text for each in told)
     assert faults(corrected.quality, 250.0) == set()
 
 
