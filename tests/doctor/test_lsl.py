@@ -52,7 +52,7 @@ def test_streams_that_are_there_missing_or_wrong_are_told_apart(
     assert missing.text == "stream gaze (name 'No such stream') is not announced"
     assert "labcrane doctor --peer" in missing.advice
     assert about(found, "maybe").verdict is Verdict.WARN
-    assert "has 4 channels, 32 are expected" in about(found, "wrong").text
+    assert "has 4 channels; 32 are expected" in about(found, "wrong").text
 
 
 @pytest.mark.slow

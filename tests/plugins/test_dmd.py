@@ -195,7 +195,7 @@ def test_between_layers_is_a_line_or_scipys_monotone_cubic() -> None:
 @pytest.mark.slow
 def test_a_signal_beyond_full_flow_is_refused(model) -> None:
     for signal in (251, -300, math.nan):
-        with pytest.raises(ProtocolError, match=r"asked of 'boom'; it is -250 to 250"):
+        with pytest.raises(ProtocolError, match=r"'boom': signal .+ is not within -250 to 250"):
             model["boom"].speed(signal, 0.0)
 
 
