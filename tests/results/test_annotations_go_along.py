@@ -17,6 +17,7 @@ from labcrane import open_recording
 from labcrane.analysis.cohort import Cohort
 from labcrane.cli.app import main
 from labcrane.recording.annotations import annotate, withdraw
+from results.undrawn import without_figures
 
 TEXTS = ("looked at the phone", "BAD_movement of the head", "„krumm“, with\na second line")
 
@@ -79,7 +80,8 @@ def test_the_report_lists_marks_and_the_page_of_somebody_without_any_says_nothin
 ) -> None:
     for data, there in ((marked, True), (electrodes.folder, False)):
         out = tmp_path / str(there)
-        assert main(["report", str(data), "--out", str(out)]) == 0
+        with without_figures():
+            assert main(["report", str(data), "--out", str(out)]) == 0
         page = (out / "participants" / "P001.html").read_text("utf-8")
         assert ("looked at the phone" in page) is there
         assert ("Annotations made in the viewer" in page) is there

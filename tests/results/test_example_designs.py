@@ -14,6 +14,7 @@ from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import discover
 from labcrane.simulation.foreseen import foreseen_tests, in_words
 from results.consumers import needs_r, r
+from results.undrawn import without_figures
 
 DESIGNS = Path(__file__).parents[2] / "examples" / "designs"
 NAMES = ("crossover", "pre_post", "washout")
@@ -82,7 +83,8 @@ def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     data, only = str(folder / "data"), ["--include", "simulated"]
     words = ["simulate", str(folder), "--participants", str(PEOPLE), "--out", data]
     assert main(words) == 0
-    assert main(["report", data, *only, "--out", str(folder / "report")]) == 0
+    with without_figures():
+        assert main(["report", data, *only, "--out", str(folder / "report")]) == 0
     words = ["export", data, *only, "--to", "tables", "--set", "streams=none"]
     assert main([*words, "--out", str(folder / "tables")]) == 0
     return folder

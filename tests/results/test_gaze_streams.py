@@ -20,6 +20,7 @@ from labcrane.recording import SessionRecord, Stream
 from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.web.viewer.glances import Glances
 from results.recorded import STUDY, record, study
+from results.undrawn import without_figures
 
 
 def resync(path: Path, *declared: str) -> int:
@@ -58,7 +59,8 @@ def test_pixels_of_which_nobody_says_of_what_are_measured_nowhere(unstated: Path
 def test_a_report_says_which_gaze_it_does_not_measure_and_how_to_declare_it(
     unstated: Path, tmp_path: Path
 ) -> None:
-    write_report(find_cohort(unstated.parents[1]), tmp_path)
+    with without_figures():
+        write_report(find_cohort(unstated.parents[1]), tmp_path)
     told = pd.read_csv(tmp_path / "tables" / "unmeasured_gaze.csv")
     assert told[["participant", "session", "stream"]].to_numpy().tolist() == [
         ["P001", 1, "eyes"],

@@ -11,6 +11,7 @@ import pytest
 
 from labcrane.analysis.report.protocols import in_words, unlike_protocols
 from labcrane.cli.app import main
+from results.undrawn import without_figures
 
 WRITTEN = """\
 labcrane: 1
@@ -144,7 +145,8 @@ def test_a_report_of_sticks_that_were_turned_round_says_so_where_a_paper_is_writ
         for who in kept:
             copytree(out / f"{who}-SIMULATED", data / f"{who}-SIMULATED")
     report = tmp_path / "report"
-    assert main(["report", str(data), "--include", "simulated", "--out", str(report)]) == 0
+    with without_figures():
+        assert main(["report", str(data), "--include", "simulated", "--out", str(report)]) == 0
     said = (
         "Not all sessions were run by the same protocol: scheme.map.slew was -left.x in 3 sessions "
         "and left.x in 2 sessions; the table of protocols says who had which."
