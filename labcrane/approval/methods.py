@@ -46,7 +46,7 @@ def _people(protocol: Mapping[str, Any]) -> list[str]:
     if groups := protocol.get("design", {}).get("groups"):
         said.append(
             f"They were allocated to {len(groups)} groups ({', '.join(groups)}) in permuted "
-            f"blocks of {len(groups)}; slots of those who dropped out were refilled"
+            f"blocks of {len(groups)}"
         )
     return said
 

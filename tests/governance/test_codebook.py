@@ -73,7 +73,7 @@ def test_the_methods_paragraph_says_what_was_approved_and_done(tmp_path: Path) -
     said = methods(lock)
     for words in (
         "“A short study” was approved by Ethics board (reference KB-12/2026, valid until",
-        "3 groups (none, visual, sound) in permuted blocks of 3",
+        "3 groups (none, visual, sound) in permuted blocks of 3. ",  # of slots the register knows
         "CH8 knuckle boom",
         "at 240 Hz",
         "aiming (distances: 2 and 3 m; movements: 1; limit: 20 s)",
