@@ -143,26 +143,42 @@ def test_a_questionnaire_is_filled_in_at_the_terminal(tmp_path: Path) -> None:
     assert scores.isna()["situational_awareness"]
 
 
+class CountedLooks(threading.Event):
+    """Tells each time that it is waited for."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.looks = threading.Semaphore(0)
+
+    def wait(self, timeout: float | None = None) -> bool:
+        self.looks.release()
+        return super().wait(timeout)
+
+
 @pytest.mark.parametrize("alone", [True, False], ids=["no page", "a page"])
 def test_without_terminal_and_page_a_session_ends_where_it_waits(
     monkeypatch: pytest.MonkeyPatch, *, alone: bool
 ) -> None:
-    monkeypatch.setattr("labcrane.cli.terminal.PATIENCE_S", 0.1)
+    monkeypatch.setattr("labcrane.cli.terminal.LOOK_S", 0.001)
+    monkeypatch.setattr("labcrane.cli.terminal.PATIENCE_S", 0.01)
     console, printed = QueueConsole(), io.StringIO()
-    given: list[Command] = []
+    terminal = Terminal(
+        console, Console(file=printed, width=200), TrialCounts({}, {}), keys=True, alone=alone
+    )
+    terminal._over = over = CountedLooks()
     with (
         Path(os.devnull).open(encoding="utf-8") as nobody,
         monkeypatch.context() as patched,
     ):
         patched.setattr("sys.stdin", nobody)
-        shown = Console(file=printed, width=200)
-        with Terminal(console, shown, TrialCounts({}, {}), keys=True, alone=alone):
-            time.sleep(0.3)
-            given += console.commands()
-            assert not given  # a trial that runs would be run to its end
+        with terminal:
+            for _ in range(100 if alone else 0):
+                assert over.looks.acquire(timeout=60.0)
+            assert not console.commands()  # a trial that runs would be run to its end
             console.report(Event("waiting", 1.0, {"what": "block 1"}))
-            time.sleep(0.5)
-            given += console.commands()
+            terminal._listener.join(60.0)
+            assert not terminal._listener.is_alive()
+            given = list(console.commands())
     assert given == ([Command(Order.END)] if alone else [])
     assert ("there is no page, so no action can be given" in printed.getvalue()) == alone
 
