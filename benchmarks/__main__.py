@@ -8,13 +8,14 @@ reference from the same run, the ratio to it, and the largest ratio that is allo
 ``--check``, the exit status is 1 when a ratio exceeds its limit, and each such row is listed. A
 benchmark that cannot run counts as failed, with the reason, and the others continue. ``--brief``
 runs each for an instant, to check that it can run; its figures are meaningless and not written.
-All benchmarks together take 45 minutes; the computer should be idle.
+All benchmarks together take 20 minutes; the computer should be idle.
 """
 
 import argparse
 import os
 import platform
 import sys
+import time
 import traceback
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
@@ -48,6 +49,7 @@ def main(words: Sequence[str] | None = None) -> int:
     lines, measured, failed = kept(), [], []
     for subject in chosen:
         print(f"== {subject}", flush=True)
+        began = time.monotonic()
         try:
             rows = import_module(f"benchmarks.{subject}").rows(brief=asked.brief)
         except (Exception, SystemExit) as error:  # noqa: BLE001 - the others go on
@@ -59,6 +61,7 @@ def main(words: Sequence[str] | None = None) -> int:
         measured += rows
         lines[subject] = [line(subject, row) for row in rows]
         print("\n".join(lines[subject]), flush=True)
+        print(f"{subject} took {time.monotonic() - began:.0f} s", flush=True)
         if not asked.brief:
             write(lines)
     if asked.brief:
