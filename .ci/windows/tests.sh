@@ -21,5 +21,5 @@ if [ $# -gt 0 ]; then
     run "$@"
 else
     run -m long tests/study_day
-    run tests/recording tests/governance tests/core tests/results tests/streams
+    run tests/{recording,governance,cli,core,design,launcher,protocol,registry,session,results,streams}
 fi

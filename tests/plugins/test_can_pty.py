@@ -56,7 +56,7 @@ class Panel:
     """
 
     def __init__(self, link: Path, swung_s: float, away_s: float) -> None:
-        program = Path(__file__).parents[1] / "can_panel.py"
+        program = Path(__file__).parents[1] / "helpers" / "can_panel.py"
         self.link = link
         self.process = subprocess.Popen(
             [sys.executable, str(program), str(link), "100", str(away_s)],

@@ -61,7 +61,7 @@ def test_a_program_written_from_the_documentation_drives_the_arm(tmp_path: Path)
     plan = plan_session(study, "P001", 1)
     rig = Rig.build(study, simulated=False)
     program = subprocess.Popen(
-        [sys.executable, str(TESTS / "gateway_program.py"), "7"],
+        [sys.executable, str(TESTS / "helpers" / "gateway_program.py"), "7"],
         stdout=subprocess.PIPE,
         encoding="utf-8",
     )

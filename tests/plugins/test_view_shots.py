@@ -58,7 +58,7 @@ def test_a_view_sends_nothing_unless_it_is_asked_to() -> None:
 
 
 def test_the_cameras_that_can_be_sent_are_those_of_the_view() -> None:
-    # A name that is not among them is refused by the core: tests/core/test_references.py.
+    # A name that is not among them is refused by the core: tests/protocol/test_references.py.
     settings = ViewSettings(camera=STILL, beside=(DEPTH,))
     assert settings.provides(load_machine("ch8"))["camera"] == ["still", "depth"]
 

@@ -123,7 +123,7 @@ def protocol(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def a_sensor(kind: str, name: str, column: str, level: str, delay_s: float) -> Iterator[str]:
     sensor = f"sensor-{os.getpid()}-{time.monotonic_ns()}"
     log = f"labcrane.feedback.{name}"
-    program = str(Path(__file__).with_name("sensor.py"))
+    program = str(Path(__file__).parents[1] / "helpers" / "sensor.py")
     process = subprocess.Popen(
         [sys.executable, program, kind, sensor, log, column, level, str(delay_s)]
     )

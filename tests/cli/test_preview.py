@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from core.fed_study import FED
+from fed_study import FED
 from needs import GRAPHICS, needs
 from rehearsal import ScriptedConsole, a_study
 

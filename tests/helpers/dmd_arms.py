@@ -14,7 +14,7 @@ from labcrane.testing import RATE_HZ, make_run, make_trial
 from labcrane_dmd import labcrane_dynamics
 from labcrane_dmd.arm.settings import ArmSettings, JawsSettings
 
-RETRIEVAL = Path(__file__).parents[1] / "protocols" / "retrieval"
+RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
 MODEL = RETRIEVAL / "arm.dmd.yaml"
 MAP = {"slew": "left.x", "shoulder": "left.y", "elbow": "right.x", "wrist": "-right.y"}
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from core.fed_study import FED
+from fed_study import FED
 from rehearsal import DiesError, DiesInTrial, ScriptedConsole, a_study
 
 import labcrane

@@ -10,7 +10,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from core.stoppable import block, idle_rig, stoppable, with_steps
 from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -20,6 +19,7 @@ from hypothesis.stateful import (
     rule,
     run_state_machine_as_test,
 )
+from stoppable import block, idle_rig, stoppable, with_steps
 
 from labcrane import ProtocolError
 from labcrane.design.plan import plan_session

@@ -1,6 +1,6 @@
 """What a run of tests started ends with it, however the run ends.
 
-    python tests/leavings.py PID TOKEN
+    python tests/helpers/leavings.py PID TOKEN
 
 Devices, witnesses and sessions of a run that was killed would go on for minutes and answer the next
 run. All processes of a run inherit ``RUN`` with a token of its own; a watcher that is none of them

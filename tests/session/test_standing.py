@@ -7,8 +7,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from core.stoppable import Count, block, idle_rig, stoppable, with_steps
 from rehearsal import NoLog
+from stoppable import Count, block, idle_rig, stoppable, with_steps
 
 from labcrane import Signal
 from labcrane.analysis.scoring.settings import COUNTS, TIME

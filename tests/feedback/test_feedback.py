@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from core.fed_study import FED
+from fed_study import FED
 from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
 
 import labcrane

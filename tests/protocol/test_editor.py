@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from core.language_client import Editor
+from language_client import Editor
 from needs import needs
 from wrong_protocols import PROTOCOLS, SKELETONS, Wrong, faults, right
 

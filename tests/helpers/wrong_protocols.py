@@ -21,7 +21,7 @@ from labcrane.protocol.streams import StreamNeed, TimeLimits
 from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.registry import Registry
 
-PROTOCOLS = Path(__file__).parents[1] / "protocols"
+PROTOCOLS = Path(__file__).parents[2] / "protocols"
 
 Place = tuple[str | int, ...]
 
