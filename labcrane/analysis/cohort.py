@@ -1,7 +1,7 @@
 """Cohort of a data folder: its participants, and who is included."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
@@ -22,9 +22,9 @@ class Status(StrEnum):
     ERASED = "erased"  # only an erasure record is left in the register; cannot be included
     EXCLUDED = "excluded"  # in the register, with a reason; cannot be included
     UNREADABLE = "unreadable"  # no participant file, or a damaged one; cannot be included
+    HALF_FINISHED = "half-finished"  # a session ended early, or is still to come
     SIMULATED = "simulated"
     PILOT = "pilot"
-    HALF_FINISHED = "half-finished"  # a session ended early, or is still to come
     COMPLETE = "complete"
 
 
@@ -49,12 +49,20 @@ class Participant:
         Status of the data.
     why
         The reason for the status, in words.
+    kind
+        Simulated or pilot, whether half-finished or not; None for a person's data.
     """
 
     name: str
     path: Path
     status: Status
     why: str
+    kind: Status | None = field(default=None, kw_only=True)
+
+    @property
+    def needs(self) -> frozenset[Status]:
+        """Statuses that must all be requested to include the participant."""
+        return frozenset({self.status, *([self.kind] if self.kind else [])})
 
     @property
     def recording(self) -> Recording:
@@ -146,7 +154,8 @@ def find_cohort(
 ) -> Cohort:
     """Find every participant below ``folder``.
 
-    Complete participants are included. Others only when their status is named in ``include``.
+    Complete participants are included. Others only when their status is named in ``include``; a
+    half-finished pilot or simulation needs both of its words.
 
     Parameters
     ----------
@@ -166,8 +175,8 @@ def find_cohort(
     """
     wanted = {Status.COMPLETE, *(_includable(word) for word in include)}
     people = everyone(folder, struck)
-    included = tuple(person for person in people if person.status in wanted)
-    left_out = tuple(person for person in people if person.status not in wanted)
+    included = tuple(person for person in people if person.needs <= wanted)
+    left_out = tuple(person for person in people if not person.needs <= wanted)
     if not included:
         raise RecordingError(_nobody(folder, left_out))
     return Cohort(folder, included, left_out)
@@ -215,7 +224,8 @@ def _nobody(folder: Path, left_out: Sequence[Participant]) -> str:
     remedies = [f"{p.name}: {p.why}" for p in left_out if p.status is Status.UNREADABLE]
     if counts[str(Status.HALF_FINISHED)]:
         remedies.append("labcrane resume continues an interrupted session")
-    asked = [f"--include {status}" for status in INCLUDABLE if counts[str(status)]]
+    needed = {status for person in left_out for status in person.needs}
+    asked = [f"--include {status}" for status in INCLUDABLE if status in needed]
     if asked:
         remedies.append(f"to use them as well: {' '.join(asked)}")
     return "; ".join([f"no usable participant in {folder}: {found}", *remedies])
@@ -244,10 +254,10 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
         hollow = [_hollow(number, recording.session(number)) for number in recording.sessions]
         if None not in hollow:
             return Participant(folder.name, path, Status.UNREADABLE, str(hollow[0]))
-        status, why = _judge(recording)
+        status, why, kind = _judge(recording)
     except (RecordingError, ProtocolError) as error:  # of the file, of the protocol in it
         return Participant(folder.name, path, Status.UNREADABLE, str(error))
-    return Participant(folder.name, path, status, why)
+    return Participant(folder.name, path, status, why, kind=kind)
 
 
 def _hollow(number: int, session: SessionRecord) -> str | None:
@@ -261,30 +271,47 @@ def _hollow(number: int, session: SessionRecord) -> str | None:
 
 def kinds_of(participants: Iterable[Participant]) -> str:
     """Return ``SIMULATED and PILOT``, as far as there are any; empty if all are real recordings."""
-    found = {participant.status for participant in participants}
+    found = {participant.kind for participant in participants}
     named = [str(kind).upper() for kind in (Status.SIMULATED, Status.PILOT) if kind in found]
     return " and ".join(named)
 
 
-def _judge(recording: Recording) -> tuple[Status, str]:
-    sessions = [recording.session(number) for number in recording.sessions]
-    for status, word in ((Status.SIMULATED, "simulated"), (Status.PILOT, "pilot")):
-        stamped = [
-            number
-            for number, session in zip(recording.sessions, sessions, strict=True)
-            if session.attrs.get(word) == "yes"
-        ]
+def _judge(recording: Recording) -> tuple[Status, str, Status | None]:
+    """Return the status, the reason for it, and the kind of the sessions."""
+    sessions = {number: recording.session(number) for number in recording.sessions}
+    kind, stamp = _kind(sessions)
+    why = _incomplete(sessions)
+    if why is not None:
+        said = f"{why}; {stamp}" if stamp else why
+        return Status.HALF_FINISHED, said, kind
+    if kind is not None:
+        return kind, stamp, kind
+    return Status.COMPLETE, f"{_progress(sessions)} to their end", None
+
+
+def _kind(sessions: Mapping[int, SessionRecord]) -> tuple[Status | None, str]:
+    """Return whether sessions are simulated or of a pilot, and which, in words."""
+    for kind, word in ((Status.SIMULATED, "simulated"), (Status.PILOT, "pilot")):
+        stamped = [number for number, each in sessions.items() if each.attrs.get(word) == "yes"]
         if stamped:
-            return status, f"session {', '.join(map(str, stamped))} is stamped {word}"
-    for number, session in zip(recording.sessions, sessions, strict=True):
+            return kind, f"session {', '.join(map(str, stamped))} is stamped {word}"
+    return None, ""
+
+
+def _incomplete(sessions: Mapping[int, SessionRecord]) -> str | None:
+    """Return what is missing of a protocol's sessions, or None if all ran to their end."""
+    for number, session in sessions.items():
         if (hollow := _hollow(number, session)) is not None:
-            return Status.HALF_FINISHED, f"{hollow}; the other sessions can be used"
+            return f"{hollow}; the other sessions can be used"
         if (why := unfinished(session)) is not None:
-            return Status.HALF_FINISHED, f"session {number} {why}"
-    planned, done = _planned(sessions[-1].protocol), len(sessions)
-    if done < planned:
-        return Status.HALF_FINISHED, f"{done} of {planned} sessions recorded"
-    return Status.COMPLETE, f"{done} of {planned} sessions recorded to their end"
+            return f"session {number} {why}"
+    _, last = max(sessions.items())
+    return _progress(sessions) if len(sessions) < _planned(last.protocol) else None
+
+
+def _progress(sessions: Mapping[int, SessionRecord]) -> str:
+    _, last = max(sessions.items())
+    return f"{len(sessions)} of {_planned(last.protocol)} sessions recorded"
 
 
 def unfinished(session: SessionRecord) -> str | None:

@@ -141,7 +141,12 @@ def measure_ahead(participant: Participant) -> MeasuredParticipant:
     """Return a participant with computed measures; a worker's function."""
     table = measures_of(participant)
     return MeasuredParticipant(
-        participant.name, participant.path, participant.status, participant.why, table
+        participant.name,
+        participant.path,
+        participant.status,
+        participant.why,
+        table,
+        kind=participant.kind,
     )
 
 

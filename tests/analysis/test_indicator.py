@@ -391,7 +391,7 @@ def test_who_was_excluded_is_not_scored_and_is_named(
     assert main(["score", str(places.root)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "left out: R002, excluded: on 2026-01-02: was ill" in said
-    assert "left out: R003-SIMULATED, simulated" in said
+    assert "left out: R003-SIMULATED, half-finished" in said
     (_, row) = converted(places.root / "evaluation.xlsx", 2)
     assert row[0] == "R001"
 

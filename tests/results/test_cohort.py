@@ -107,6 +107,30 @@ def test_an_excluded_participant_is_listed_with_the_reason_and_not_used(data: Pa
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("kind", ["pilot", "simulated"])
+def test_an_unfinished_pilot_or_simulation_needs_both_of_its_words(
+    tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from labcrane.analysis.cohort import kinds_of
+    from labcrane.session.commands import Command, Order
+    from results.recorded import record, study
+
+    stamps = {kind: True}
+    record(study(tmp_path), tmp_path / "data", "P001", orders={0: [Command(Order.END)]}, **stamps)
+    for asked in ([kind], ["half-finished"]):
+        with pytest.raises(RecordingError) as refused:
+            find_cohort(tmp_path / "data", asked)
+        assert "1 half-finished" in str(refused.value)
+        both = {f"--include {kind} --include half-finished"}
+        assert str(refused.value).rpartition(": ")[2] in both
+    assert main(["report", str(tmp_path / "data"), "--include", kind]) == 1
+    assert "no usable participant" in capsys.readouterr().err
+    cohort = find_cohort(tmp_path / "data", [kind, "half-finished"])
+    assert cohort.included[0].why == f"session 1 ended by order; session 1 is stamped {kind}"
+    assert kinds_of(cohort.included) == kind.upper()
+
+
+@pytest.mark.slow
 def test_a_session_that_is_still_to_come_makes_a_participant_half_finished(tmp_path: Path) -> None:
     from results.recorded import STUDY, record, study
 

@@ -514,7 +514,7 @@ def test_trial_tables_without_files_are_those_of_the_participant_files(
     tables = [SimulationJob(study, cohort, tmp_path / "tables", name) for name in names]
     list(simulate_study(files))
     made = dict(zip(names, simulate_tables(tables), strict=True))
-    people = find_cohort(tmp_path / "files", ["simulated"]).included
+    people = find_cohort(tmp_path / "files", ["simulated", "half-finished"]).included
     assert len(people) == len(names)
     for person in people:
         whole = measures_of(person)

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from labcrane.analysis.cohort import Cohort, Participant, Status, kinds_of
+from labcrane.analysis.cohort import INCLUDABLE, Cohort, Participant, kinds_of
 from labcrane.analysis.gaze import fixations_of, gaze_units, with_unseen_areas
 from labcrane.analysis.gaze_streams import unmeasured_of
 from labcrane.analysis.measures import DEFAULTS, MeasureSettings, measures_of
@@ -106,7 +106,7 @@ def write_report(
     everything = with_unseen_areas(pd.concat(movements, ignore_index=True))
     kinds = kinds_of(cohort.included)
     page = Page(_title(cohort.included), folder / "report.html", folder, footer=kinds)
-    _stamp(page, [participant.status for participant in cohort.included])
+    _stamp(page, cohort.included)
     page.links({p.name: f"participants/{p.name}.html" for p in cohort.included})
     _who(page, cohort, everything)
     groups = {
@@ -190,11 +190,11 @@ def _title(participants: Sequence[Participant]) -> str:
     return f"{kinds}: {title}" if kinds else title
 
 
-def _stamp(page: Page, statuses: list[Status]) -> None:
-    for status in (Status.SIMULATED, Status.PILOT, Status.HALF_FINISHED):
-        count = sum(one is status for one in statuses)
+def _stamp(page: Page, people: Sequence[Participant]) -> None:
+    for status in INCLUDABLE:
+        count = sum(status in one.needs for one in people)
         if count:
-            page.say(f"{count} of {len(statuses)} participants here are {status}.", stamp=True)
+            page.say(f"{count} of {len(people)} participants here are {status}.", stamp=True)
 
 
 def _is_aiming(results: "pd.DataFrame") -> bool:
@@ -596,7 +596,7 @@ def _participant_page(
         footer=kinds_of([participant]),
     )
     page.links({"study": "../report.html"})
-    _stamp(page, [participant.status])
+    _stamp(page, [participant])
     page.say(participant.why)
     results = own[is_result(own)]
     if _is_aiming(results):

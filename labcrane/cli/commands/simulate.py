@@ -395,7 +395,7 @@ def _movements(
     """Return the participants of a pool, who may be more in its folder."""
     from labcrane.analysis.cohort import find_cohort
 
-    there = find_cohort(folder.resolve(), ["simulated"]).included
+    there = find_cohort(folder.resolve(), ["simulated", "half-finished"]).included
     wanted = [person for person in there if person.name in people]
     return _measured(wanted, people, workers, scheduler)
 

@@ -116,6 +116,12 @@ class Person:
     notes: tuple[str, ...] = ()
     bytes: int = 0
 
+    @property
+    def real(self) -> bool:
+        """Whether these are a participant's data, not those of a pilot or a simulation."""
+        kinds = {Status.SIMULATED, Status.PILOT}
+        return DataFolder.pseudonym(self.name) == self.name and self.status not in kinds
+
 
 @dataclass(frozen=True, slots=True)
 class Overview:
@@ -356,9 +362,7 @@ def _due(
     planned: Sequence[PlannedSession], person: Person, entry: Entry | None, today: date
 ) -> Due | None:
     """Return a person's next session; None if all are done, or if excluded or simulated."""
-    if DataFolder.pseudonym(person.name) != person.name or person.status in {
-        Status.EXCLUDED, Status.SIMULATED, Status.PILOT
-    }:  # fmt: skip
+    if not person.real or person.status == Status.EXCLUDED:
         return None
     begun = {each.number: each.day for each in person.sat if each.number}
     if entry is not None:

@@ -56,7 +56,7 @@ def page_of(overview: Overview, today: date, made: str) -> str:
 
 def _figures(overview: Overview) -> Iterator[tuple[str, str, str, str]]:
     """Yield the figures: name, number, additional text and level."""
-    real = [one for one in overview.people if one.status not in {"simulated", "pilot"}]
+    real = [one for one in overview.people if one.real]
     complete = sum(one.status == "complete" for one in real)
     sessions = sum(len(one.sat) for one in real)
     doubtful = sum(sat.level != "ok" for one in real for sat in one.sat)
