@@ -147,13 +147,15 @@ def simulate_trials(order: SimulationJob) -> "pd.DataFrame":
     path = order.data / f"{order.folder.name}{TRIALS}"
     if path.exists():
         return pd.read_parquet(path)
-    tables = []
+    tables, left = [], False
     own = tempfile.TemporaryDirectory(prefix=f"labcrane-{order.participant}-")
     with cleared(), own as scratch:
         for visit, attendance in visits(order, Path(scratch)):
             _run(_record, visit, attendance, order.loop)
             tables.append(_table(visit, attendance.rows))
+            left = attendance.left
     table = pd.concat(tables, ignore_index=True)
+    table.insert(1, "status", "half-finished" if left else "simulated")
     make_folder(order.data)
     with tempfile.TemporaryDirectory(dir=order.data, prefix=UNFINISHED) as scratch:
         table.to_parquet(Path(scratch) / path.name)
@@ -175,9 +177,8 @@ def _table(visit: Visit, rows: "Sequence[Mapping[str, Value]]") -> "pd.DataFrame
             table[name] = np.array([np.nan if v is None else v for v in values], np.float64)
     table = measures_of_trials(table) if rows else table
     table.insert(0, "participant", visit.folder.name)
-    table.insert(1, "status", "simulated")
-    table.insert(2, "session", visit.session)
-    table.insert(3, "session_name", visit.study.protocol.sessions[visit.session - 1].name)
+    table.insert(1, "session", visit.session)
+    table.insert(2, "session_name", visit.study.protocol.sessions[visit.session - 1].name)
     return table
 
 
