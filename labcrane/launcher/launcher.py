@@ -30,7 +30,7 @@ from labcrane.session.commands import (
     StreamLost,
     given_by,
 )
-from labcrane.session.eligibility import Admission, check_eligibility
+from labcrane.session.eligibility import Admission, check_eligibility, close_visit
 from labcrane.session.session import finish, outlook, recording, running, still_owed
 from labcrane.session.visit import Visit, claim
 from labcrane.streams.recorder.handle import RecorderHandle
@@ -141,6 +141,8 @@ class Launcher:
                 self._recorder.stop()
             if parts(visit.journal):
                 report = self.sync_report = finish(visit)
+            else:
+                close_visit(visit)  # it did not start: the register has no such session
         where = read_crash_marker(visit.crash_marker) if died is not None else None
         owed = still_owed(visit, admission) if self._owes and parts(visit.journal) else ""
         self.outcome = Outcome(died, str(where or ""), report, owed)

@@ -14,13 +14,15 @@ from needs import needs
 import labcrane
 from labcrane import DeviceError, ProtocolError
 from labcrane.cli.app import main
+from labcrane.launcher import launcher
 from labcrane.participants import enrolment
 from labcrane.participants.deviations import all_deviations
 from labcrane.participants.personal_data import personal
 from labcrane.participants.register import changed, read
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.eligibility import check_eligibility
 from labcrane.session.session import run
+from labcrane.session.visit import Visit
 
 TWO_SESSIONS = GOVERNED + (
     "  - name: retention\n    after_days: [1, 3]\n    steps:\n"
@@ -76,8 +78,33 @@ def test_the_list_of_participants_says_which_session_is_owed(
     assert f"1 {TODAY} ended by order" in listed()
     run(lab.visit("P001", fast=True, resumed=True), Willing())
     assert f"1 {TODAY} complete" in listed()
+    journal = lab.places.raw("P001") / "ses-01_run.xdf"
+    added = journal.with_name("ses-01_run.part7.xdf")
+    added.write_bytes(journal.read_bytes())
+    assert f"1 {TODAY} complete, as far as the file goes (" in listed()
+    assert f"labcrane recover {journal.parent}" in listed()
+    added.unlink()
     (lab.places.raw("P001") / "P001.h5").unlink()
-    assert f"1 {TODAY} without participant file: it runs still, or was killed" in listed()
+    assert (
+        f"1 {TODAY} without participant file: still running, or was killed; labcrane resume"
+    ) in listed()
+    for part in journal.parent.glob("*.xdf"):
+        part.unlink()
+    assert f"1 {TODAY} did not start: nothing of it is recorded; labcrane run begins it" in listed()
+
+
+def test_a_session_whose_feedback_cannot_be_started_is_not_in_the_register(
+    lab: Lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(visit: Visit) -> None:
+        assert read(lab.places).participants["P001"].sessions
+        raise DeviceError("feedback 'window' cannot be started: there is no display")
+
+    monkeypatch.setattr(launcher, "FeedbackProcesses", refuse)
+    lab.consent("P001")
+    with pytest.raises(DeviceError, match="feedback 'window' cannot be started"):
+        launcher.Launcher(lab.visit("P001", feedback=True), QueueConsole(), print).run()
+    assert read(lab.places).participants["P001"].sessions == []
 
 
 @pytest.mark.slow

@@ -73,16 +73,28 @@ def _ended(places: "Places", participant: str, session: int) -> str:
     """Return how a session ended, as its participant file has it now."""
     from labcrane.analysis.cohort import unfinished
     from labcrane.errors import RecordingError
-    from labcrane.recording.participant_file.reader import open_recording
-    from labcrane.recording.paths import participant_path
+    from labcrane.recording.participant_file.backlog import backlog
+    from labcrane.recording.participant_file.reader import Recording
+    from labcrane.recording.paths import journal_path, participant_path, parts
 
-    path = participant_path(places.raw(participant))
-    if not path.exists():
-        return "without participant file: it runs still, or was killed"
+    folder = places.raw(participant)
+    path = participant_path(folder)
     try:
-        return unfinished(open_recording(path).session(session)) or "complete"
+        recording = Recording(path) if path.exists() else None
+        if recording is not None and session in recording.sessions:
+            ended = unfinished(recording.session(session)) or "complete"
+            behind = backlog(path).get(session)
+            return f"{ended}, as far as the file goes ({behind})" if behind else ended
+        if not parts(journal_path(folder, session, "run")):
+            return "did not start: nothing of it is recorded; labcrane run begins it"
+        if recording is not None:
+            return backlog(path)[session]
     except RecordingError as error:
         return f"cannot be read: {error}"
+    return (
+        "without participant file: still running, or was killed; labcrane resume continues it, and "
+        f"labcrane recover {folder} builds the file"
+    )
 
 
 def consent(
