@@ -48,6 +48,10 @@ class RecordingError(LabcraneError):
     """A recording cannot be written, found or read."""
 
 
+class OutdatedRecordingWarning(UserWarning):
+    """A participant file is read that lacks something of the journals beside it."""
+
+
 MOST_LISTED = 40
 """Most names that a message lists with the suggested one."""
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.files.yaml import parse_yaml
-from labcrane.recording.participant_file.reader import Recording, SessionRecord, open_recording
+from labcrane.recording.participant_file.backlog import backlog
+from labcrane.recording.participant_file.reader import Recording, SessionRecord
 from labcrane.recording.paths import participant_path
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class Participant:
     @property
     def recording(self) -> Recording:
         """The participant file; each access reads it again, so that memory does not fill up."""
-        return open_recording(self.path)
+        return Recording(self.path)
 
     @cached_property
     def context(self) -> dict[str, Any]:
@@ -245,10 +246,15 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
         why = (
             "its session is still running, or was killed: labcrane resume continues it, and "
             f"labcrane recover {folder} builds the participant file from what was recorded"
+            if any(folder.glob("ses-*_run*.xdf"))
+            else "its session did not start: only external streams are recorded; labcrane run "
+            "begins it"
         )
         return Participant(folder.name, path, Status.UNREADABLE, why)
     try:
-        recording = open_recording(path)
+        if behind := backlog(path):
+            return Participant(folder.name, path, Status.UNREADABLE, "; ".join(behind.values()))
+        recording = Recording(path)
         if not recording.sessions:
             return Participant(folder.name, path, Status.UNREADABLE, "holds no session")
         hollow = [_hollow(number, recording.session(number)) for number in recording.sessions]
@@ -263,7 +269,7 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
 def _hollow(number: int, session: SessionRecord) -> str | None:
     """Return why a session contains no usable data; None if it does."""
     if not session.context:
-        return f"session {number} has no metadata: the program was killed at its start"
+        return f"session {number} has no metadata: it did not start, or was killed at its start"
     if "state" not in session.streams or not len(session.streams["state"].time):
         return f"session {number} contains no frames: it ended before its first tick"
     return None
@@ -317,10 +323,13 @@ def _progress(sessions: Mapping[int, SessionRecord]) -> str:
 def unfinished(session: SessionRecord) -> str | None:
     """Return how a session ended before its end, or None when it did not."""
     events = session.events
-    ends = events[events["name"] == "session.end"]
-    if ends.empty:
+    marks = events[events["name"].isin(["session.start", "session.end", "session.failed"])]
+    last = marks.iloc[-1] if len(marks) else None
+    if last is None or last["name"] == "session.start":
         return "has no end: the program was killed"
-    reason = str(ends.iloc[-1]["data"].get("reason"))
+    if last["name"] == "session.failed":
+        return f"failed: {last['data'].get('why')}"
+    reason = str(last["data"].get("reason"))
     return None if reason == "complete" else f"ended {reason}"
 
 

@@ -8,15 +8,16 @@ their names and help lines.
 import io
 import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from labcrane.cli import plugin_groups as extension
 from labcrane.cli.help import Plain, Sections
-from labcrane.errors import LabcraneError, PluginError, ProtocolError
+from labcrane.errors import LabcraneError, OutdatedRecordingWarning, PluginError, ProtocolError
 
 MODULES = {
     "run": ("demo", "run", "resume"),
@@ -58,7 +59,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         words = sys.argv[1:] if arguments is None else list(arguments)
-        commands(words)(args=words, prog_name="labcrane")
+        with warnings.catch_warnings():
+            say_what_is_outdated()
+            commands(words)(args=words, prog_name="labcrane")
     except SystemExit as leaving:
         return leaving.code if isinstance(leaving.code, int) else 0
     except ModuleNotFoundError as error:
@@ -91,8 +94,24 @@ def speak_utf8() -> None:
                 stream.reconfigure(encoding="utf-8", errors=stream.errors)
 
 
-def complain(error: LabcraneError) -> None:
-    """Write an error and its remedy to the standard error."""
+def say_what_is_outdated() -> None:
+    """Write that an outdated recording is read to the standard error, once for each."""
+    otherwise = warnings.showwarning
+    said: set[str] = set()
+
+    def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+        if not issubclass(category, OutdatedRecordingWarning):
+            otherwise(message, category, *place, **more)
+        elif str(message) not in said:
+            said.add(str(message))
+            complain(message)
+
+    warnings.simplefilter("always", OutdatedRecordingWarning)
+    warnings.showwarning = show
+
+
+def complain(error: Warning | LabcraneError | str) -> None:
+    """Write an error or a warning, and its remedy, to the standard error."""
     from rich.console import Console
 
     complaint = Console(stderr=True, soft_wrap=True)

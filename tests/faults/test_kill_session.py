@@ -22,6 +22,8 @@ from faults.sessions import (
 )
 
 from labcrane import open_recording
+from labcrane.errors import OutdatedRecordingWarning
+from labcrane.recording.participant_file.backlog import backlog
 from labcrane.recording.participant_file.recover import recover
 from labcrane.recording.xdf.reader import read_xdf
 from labcrane.session.postprocess import conclude
@@ -114,12 +116,20 @@ def test_kills_hit_the_session_in_all_its_stages(killed) -> None:
 @pytest.mark.slow
 def test_every_recording_opens_and_no_frame_is_missing(killed) -> None:
     _, runs, seen = killed
-    witnessed = 0
+    witnessed = outdated = 0
     for data, _, began, ended in runs:
+        file = data / "P001-SIMULATED" / "P001-SIMULATED.h5"
+        behind = backlog(file)
+        assert all(f"labcrane recover {file.parent}" in said for said in behind.values())
+        if behind:
+            with pytest.warns(OutdatedRecordingWarning, match="session 2"):
+                open_recording(file)
+        outdated += bool(behind)
         for done in recover(data, conclude):
             assert done.problem == ""
         heard = {t: sample for t, sample in seen.items() if began <= t <= ended}
-        recording = open_recording(data / "P001-SIMULATED" / "P001-SIMULATED.h5")
+        assert backlog(file) == {}
+        recording = open_recording(file)
         if 2 not in recording.sessions:
             assert not heard, "what was sent was written before"
             continue
@@ -131,6 +141,7 @@ def test_every_recording_opens_and_no_frame_is_missing(killed) -> None:
         for stamp, sample in heard.items():
             assert rows[stamp] == sample
         witnessed += len(heard)
+    assert outdated, "every kill was before the first frame or after the last"
     assert witnessed > 240, "the witness has hardly seen anything"
 
 

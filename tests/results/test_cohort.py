@@ -98,6 +98,48 @@ def test_nobody_to_use_names_what_would_help(data: Path, tmp_path: Path) -> None
         find_cohort(tmp_path)
 
 
+def test_a_file_that_is_older_than_its_journals_is_left_out_and_named(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("P001", "P002"):
+        shutil.copytree(data / name, tmp_path / name)
+    folder = tmp_path / "P001"
+    first = folder / "ses-01_run.xdf"
+    shutil.copyfile(first, folder / "ses-01_run.part2.xdf")
+    why = (
+        f"session 1 is only in part in {folder / 'P001.h5'}, which is older than the journals "
+        f"beside it; the session is still running, or was killed: run labcrane recover {folder}"
+    )
+    cohort = find_cohort(tmp_path)
+    assert [person.name for person in cohort.included] == ["P002"]
+    assert [(one.status, one.why) for one in cohort.left_out] == [(Status.UNREADABLE, why)]
+    words = ["export", str(tmp_path), "--to", "tables", "--out", str(tmp_path / "out")]
+    assert main([*words, "--set", "streams=none"]) == 3
+    assert f"left out: P001, unreadable: {why}" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.slow
+def test_a_replay_of_a_file_that_is_older_than_its_journals_says_so_once(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "P002"
+    shutil.copytree(data / "P002", folder)
+    shutil.copyfile(folder / "ses-01_run.xdf", folder / "ses-01_run.part2.xdf")
+    main(["replay", str(folder / "P002.h5")])
+    assert capsys.readouterr().err.count(f"run labcrane recover {folder}") == 1
+
+
+def test_external_streams_alone_are_of_a_session_that_did_not_start(tmp_path: Path) -> None:
+    (tmp_path / "P001").mkdir()
+    (tmp_path / "P001" / "ses-01_streams.xdf").write_bytes(b"XDF:")
+    with pytest.raises(RecordingError) as refused:
+        find_cohort(tmp_path)
+    assert str(refused.value).endswith(
+        "P001: its session did not start: only external streams are recorded; labcrane run "
+        "begins it"
+    )
+
+
 def test_an_excluded_participant_is_listed_with_the_reason_and_not_used(data: Path) -> None:
     excluded = {"P002": (Status.EXCLUDED, "on 2026-05-02: fell asleep")}
     found = find_cohort(data, struck=excluded)

@@ -2,6 +2,7 @@
 
 import json
 import re
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.errors import RecordingError
+from labcrane.errors import OutdatedRecordingWarning, RecordingError
 from labcrane.recording.annotations import COLUMNS, read_annotations
 from labcrane.recording.journal import GROUPS
+from labcrane.recording.participant_file.backlog import backlog
 from labcrane.recording.participant_file.columns import CHUNK, holds_texts, text_of, texts_of
 from labcrane.recording.participant_file.session_group import SYNC_REPORT
 from labcrane.recording.participant_file.stream_group import BASES
@@ -446,6 +448,9 @@ class Recording:
 def open_recording(path: Path | str) -> Recording:
     """Open a participant file.
 
+    Warns with :class:`~labcrane.errors.OutdatedRecordingWarning` where the journals beside it
+    hold more.
+
     Raises
     ------
     RecordingError
@@ -457,7 +462,10 @@ def open_recording(path: Path | str) -> Recording:
             f"there is no participant file {path}; if there are journals, run labcrane recover "
             f"{path.parent} to build it"
         )
-    return Recording(path)
+    recording = Recording(path)
+    for said in backlog(path).values():
+        warnings.warn(said, OutdatedRecordingWarning, stacklevel=2)
+    return recording
 
 
 @contextmanager

@@ -5,15 +5,14 @@ from pathlib import Path
 
 from labcrane.errors import RecordingError
 from labcrane.recording.crash_marker import crash_marker_path, read_crash_marker
-from labcrane.recording.participant_file.columns import texts_of
+from labcrane.recording.participant_file.backlog import journals_of, sizes_in, sizes_on_disk
 from labcrane.recording.participant_file.writer import (
     Conclude,
     Consolidated,
     consolidate,
-    group_name,
     reading,
 )
-from labcrane.recording.paths import journal_path, participant_path, parts, session_of
+from labcrane.recording.paths import journal_path, participant_path, session_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +60,7 @@ def recover(folder: Path, conclude: Conclude | None = None) -> list[Recovery]:
 
 
 def _recover(folder: Path, session: int, conclude: Conclude | None) -> Recovery:
-    path, journals = participant_path(folder), _journals_of(folder, session)
+    path, journals = participant_path(folder), journals_of(folder, session)
     where = str(read_crash_marker(crash_marker_path(journal_path(folder, session, "run"))) or "")
     try:
         if is_recovered(folder, session):
@@ -82,18 +81,5 @@ def is_recovered(folder: Path, session: int) -> bool:
     path = participant_path(folder)
     if not path.exists():
         return False
-    firsts = _journals_of(folder, session)
-    on_disk = {part.name: part.stat().st_size for first in firsts for part in parts(first)}
     with reading(path) as file:
-        if group_name(session) not in file:
-            return False
-        made_of = file[f"{group_name(session)}/journals"]
-        return on_disk == dict(
-            zip(texts_of(made_of["name"]), made_of["size"][:].astype(int), strict=True)
-        )
-
-
-def _journals_of(folder: Path, session: int) -> list[Path]:
-    """Return the first parts of a session's journals that there are."""
-    firsts = (journal_path(folder, session, kind) for kind in ("run", "streams"))
-    return [first for first in firsts if parts(first)]
+        return sizes_in(file, session) == sizes_on_disk(folder, session)

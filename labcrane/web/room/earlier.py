@@ -81,10 +81,10 @@ def _read(found: Earlier, folder: Path, study: str, session: int, wanted: tuple[
 def _take(
     found: Earlier, file: Path, study: str, wanted: tuple[str, ...], mine: int | None
 ) -> None:
-    from labcrane.recording.participant_file.reader import open_recording  # noqa: PLC0415 - heavy
+    from labcrane.recording.participant_file.reader import Recording  # noqa: PLC0415 - heavy
 
     values: dict[str, list[float]] = {}
-    for record in open_recording(file):
+    for record in Recording(file):  # of this participant it is behind
         if record.attrs.get("study") != study:
             continue
         if mine is not None and int(record.attrs["session"]) >= mine:

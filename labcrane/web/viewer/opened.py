@@ -8,7 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from labcrane.errors import RecordingError
-from labcrane.recording.participant_file.reader import SessionRecord, open_recording
+from labcrane.recording.participant_file.backlog import backlog
+from labcrane.recording.participant_file.reader import Recording, SessionRecord, open_recording
 from labcrane.recording.participant_file.recover import recover
 from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.recording.paths import participant_path
@@ -34,12 +35,14 @@ def opened(path: Path, session: int, scratch: Path, say: Callable[[str], None]) 
     """
     file = participant_path(path) if path.is_dir() else path
     try:
-        return open_recording(file).session(session)
+        why = backlog(file).get(session, "") if file.is_file() else ""
+        if not why:
+            return open_recording(file).session(session)
     except (RecordingError, *DAMAGED) as error:
-        journals = sorted(file.parent.glob(f"ses-{session:02d}_*"))
-        if not any(journal.suffix == ".xdf" for journal in journals):
+        if not any(file.parent.glob(f"ses-{session:02d}_*.xdf")):
             raise
         why = str(error).partition("\n")[0]
+    journals = sorted(file.parent.glob(f"ses-{session:02d}_*"))
     folder = scratch / file.stem
     folder.mkdir(parents=True, exist_ok=True)
     for journal in journals:
@@ -48,4 +51,4 @@ def opened(path: Path, session: int, scratch: Path, say: Callable[[str], None]) 
     for done in recover(folder, conclude):
         if done.session == session and done.problem:
             raise RecordingError(f"neither {file} nor its journals can be read: {done.problem}")
-    return open_recording(participant_path(folder)).session(session)
+    return Recording(participant_path(folder)).session(session)
