@@ -1,40 +1,40 @@
 """Problem report: the files of an archive for a bug report, with nothing of people in them.
 
 What goes in is named here, event by event and field by field; everything else stays out. Texts that
-go in are cleaned: pseudonyms, users, computers, folders and addresses are replaced.
+go in are cleaned: only words of labcrane's own source, versions and numbers stay.
 """
 
-import getpass
 import json
 import math
 import os
-import platform
 import re
-import socket
 import traceback
 import zipfile
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from importlib.metadata import distributions
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
+from labcrane.cli.cleaner import Cleaner
 from labcrane.doctor.report import Diagnosis
 from labcrane.doctor.versions import versions
 from labcrane.errors import RecordingError
 from labcrane.files.atomic import replacing
 from labcrane.participants.folders import Places
-from labcrane.participants.mentions import LETTER, spellings
-from labcrane.participants.register import read
+from labcrane.participants.register import Register, read
+from labcrane.protocol.protocol import Participants
 from labcrane.recording.crash_marker import crash_marker_path, read_crash_marker
 from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
 from labcrane.recording.journal_reader import JournalState, LoggedEvent, SessionLog, read_journal
 from labcrane.recording.paths import journal_path, parts, session_of
+from labcrane.registry.entry_points import one_name
+from labcrane.registry.hookspecs import PROJECT
 
 KEPT: Mapping[str, tuple[str, ...]] = {
     "session.start": (),
@@ -86,142 +86,20 @@ Problem report of labcrane.
 It has the findings of labcrane doctor, versions and what is installed. Of one session it has the
 events of the program, when steps and trials began and ended, the timing of the loop and of streams,
 and the state of the journals. It has no answers, notes, results, positions or gaze. Pseudonyms are
-participant-1 and so on. Users, computers, folders and addresses are replaced.
+participant-1 and so on. Texts keep words of labcrane's own source, versions and numbers; quoted
+values, paths, addresses and all other words are replaced.
 """
 
-_MAIL = re.compile(r"[^\s@]{1,64}@[^\s@]+\.\w\w\S*")
-_URL = re.compile(r"\b[a-z][a-z0-9+.-]*://[^\s\"'<>]+", re.IGNORECASE)
-_PART = r"[^/\\\n\"'<>|:;,()\[\]{}]+"  # a folder may have spaces, where a slash follows
-_LAST = r"[^\s/\\\"'<>|:;,()\[\]{}]*"
-_PATH = re.compile(
-    r"/dev/\w+(?![\w/])|"
-    rf"(?<![\w.)\]°/\\…])(?:~[\w.-]*|[A-Za-z]:|\\(?=\\))?[/\\]+(?=[^\s/\\])(?:{_PART}[/\\]+)*{_LAST}"
-)
-_SLASHES = re.compile(r"[/\\]+")
-_HOME = re.compile(r"(?:[A-Za-z]:)?[/\\]+(?:home|Users)[/\\]+[^/\\\s\"']+", re.IGNORECASE)
-_DEVICE = re.compile(r"/dev/\w+")
-_ADDRESS = re.compile(
-    r"(?<![\w.-])\d{1,3}(?:\.\d{1,3}){3}(?![\w-]|\.\d)"  # Linux-5.15.167.4-generic is none
-    r"|\b(?:[0-9a-f]{2}-){5}[0-9a-f]{2}\b"
-    r"|(?<![\w:])(?:[0-9a-f]{1,4}:){3,}[0-9a-f:]*"
-    r"|(?<![\w:])(?:[0-9a-f]{1,4})?::[0-9a-f][0-9a-f:]*",
-    re.IGNORECASE,
-)
-_ORDINARY = frozenset(
-    [
-        "data", "desktop", "documents", "home", "lab", "labcrane", "media", "mnt", "opt", "private",
-        "protocols", "studies", "study", "tmp", "users", "usr", "var", "work",
-    ]
-)  # fmt: skip
-"""Names of folders, users and computers that identify no person."""
+T = TypeVar("T")
 
-_SHORT = 4
-"""Users and computers with fewer letters are replaced as whole words: others hold them by chance.
-
-So are folders and pseudonyms."""
-
-
-class Cleaner:
-    """Replaces in texts what could lead to people or to their computers.
-
-    Parameters
-    ----------
-    people
-        Pseudonyms; each becomes ``participant-1`` and so on, in the order of their names.
-    computers
-        Names of computers beside this one's.
-    folders
-        Folders whose names are replaced wherever they are: of the study and of the data.
-    """
-
-    def __init__(
-        self, people: Iterable[str], computers: Iterable[str], folders: Iterable[Path]
-    ) -> None:
-        known = [*folders, Path.home(), Path.cwd()]
-        places = {str(each) for folder in known for each in (folder.absolute(), folder.resolve())}
-        self._places = _any_of(each for each in places if len(Path(each).parts) > 1)
-        named = dict.fromkeys(_of_hosts(computers), "computer") | dict.fromkeys(_users(), "user")
-        names = dict.fromkeys(_parts(places), "folder") | named
-        self._names = {
-            name.lower(): word
-            for name, word in names.items()
-            if name.lower() not in {"", *_ORDINARY}
-        }
-        self._people = {
-            spelled.lower(): f"participant-{number}"
-            for number, person in enumerate(sorted(set(people)), start=1)
-            for spelled in spellings(person)
-            if spelled
-        }
-        anywhere = {name.lower() for name in named if len(name) >= _SHORT} & set(self._names)
-        self._anywhere = _any_of(anywhere)
-        self._words = _any_of(set(self._names) - anywhere, whole=True)
-        self._called = _any_of(self._people, whole=True)
-
-    def text(self, text: str) -> str:
-        """Return a text without people, users, computers, folders and addresses."""
-        text = _URL.sub("(an address)", _MAIL.sub("(an e-mail address)", text))
-        text = self._places.sub("/…", text)  # their names may have spaces
-        text = _HOME.sub("…/user", _PATH.sub(_named_only, text))
-        text = _ADDRESS.sub("(an address)", text)
-        text = self._called.sub(lambda found: self._people[found[0].lower()], text)
-        for pattern in (self._anywhere, self._words):
-            text = pattern.sub(lambda found: self._names[found[0].lower()], text)
-        return text
-
-    def data(self, value: Any) -> Any:
-        """Return plain data with every text in it cleaned; names of fields too."""
-        if isinstance(value, str):
-            return self.text(value)
-        if isinstance(value, Mapping):
-            return {self.text(str(key)): self.data(each) for key, each in value.items()}
-        if isinstance(value, list | tuple):
-            return [self.data(each) for each in value]
-        return value
-
-
-def _any_of(words: Iterable[str], *, whole: bool = False) -> re.Pattern[str]:
-    """Return what finds any of some words, the longest first."""
-    listed = "|".join(re.escape(word) for word in sorted(words, key=len, reverse=True))
-    if not listed:
-        return re.compile(r"(?!)")
-    found = rf"(?<!{LETTER})(?:{listed})(?!{LETTER})" if whole else listed
-    return re.compile(found, re.IGNORECASE)
-
-
-def _named_only(found: re.Match[str]) -> str:
-    """Return a path as its last name; a device as it is, and a user's folder without the user."""
-    if _DEVICE.fullmatch(found[0]):
-        return found[0]
-    path = found[0].rstrip("/\\")
-    if _HOME.fullmatch(path):
-        return "…/user"
-    last = _SLASHES.split(path)[-1]
-    return "…" if last == "…" else f"…/{last}"
-
-
-def _parts(places: Iterable[str]) -> list[str]:
-    """Return the names of folders, and of those that they are in."""
-    return [part for place in places for part in Path(place).parts[1:]]
-
-
-def _users() -> Iterator[str]:
-    yield from (os.environ.get(name, "") for name in ("USER", "USERNAME", "LOGNAME"))
-    yield Path.home().name
-    with suppress(OSError, KeyError, ImportError):  # a process without an account
-        yield getpass.getuser()
-
-
-def _of_hosts(others: Iterable[str]) -> Iterator[str]:
-    """Yield names of computers, each also without its domain."""
-    for name in (
-        platform.node(),
-        socket.gethostname(),
-        os.environ.get("COMPUTERNAME", ""),
-        *others,
-    ):
-        yield name
-        yield name.partition(".")[0]
+NAMES = {
+    "what": "name",
+    "stream": "stream",
+    "channel": "channel",
+    "block": "block",
+    "trigger": "trigger",
+}
+"""Fields of events whose texts a study chooses, by what they are replaced with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,62 +143,118 @@ def find_session(folder: Path, number: int | None = None) -> FoundSession | None
     return FoundSession(*max(chosen, key=lambda key: (found[key], str(key[0]), key[1])))
 
 
-def people_of(folder: Path) -> set[str]:
-    """Return all pseudonyms that a data folder, or the one that a part of it is in, knows.
+def people_of(folder: Path, missing: list[str]) -> tuple[set[str], set[str]]:
+    """Return the pseudonyms of a data folder and of the one that it is in, and their patterns.
 
-    Raises
-    ------
-    RecordingError
-        Its register cannot be read, so the pseudonyms to be replaced are unknown.
+    A register that cannot be read is added to what is missing.
     """
-    names = set()
+    names, patterns = set[str](), set[str]()
     for root in (folder, folder.absolute().parent):
-        if (places := Places(root)).register.is_file():
-            register = read(places)
-            names |= set(register.names())
-            names |= {each for entry in register.participants.values() for each in entry.formerly}
+        there = partial(read, Places(root))
+        register = _tried("the register", there, Register(), missing)
+        names |= set(register.names())
+        names |= {each for entry in register.participants.values() for each in entry.formerly}
+        names |= {stone.participant for stone in register.tombstones}
+        patterns |= {register.pattern} - {""}
     journals = [*folder.rglob("ses-*.xdf"), *folder.absolute().parent.glob("*/ses-*.xdf")]
-    return names | {DataFolder.pseudonym(path.parent.name) for path in journals}
+    folders = {path.parent.name for path in journals}
+    return names | {DataFolder.pseudonym(name) for name in folders}, patterns
+
+
+def pattern_of(protocol: Path) -> set[str]:
+    """Return patterns of pseudonyms in a protocol, also if it is not valid or not readable."""
+    try:
+        text = protocol.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return set()
+    found = re.findall(r"""\bpattern:\s*(?:'([^'\n]*)'|"([^"\n]*)"|([^\s'"#,}][^\n#,]*))""", text)
+    return {each for one in found for each in one if each} | {Participants().pattern}
 
 
 def compose(
-    found: Diagnosis, trouble: Sequence[str], session: FoundSession | None, folders: Sequence[Path]
+    found: Diagnosis | None,
+    trouble: Sequence[str],
+    session: FoundSession | None,
+    folders: Sequence[Path],
+    patterns: Iterable[str] = (),
 ) -> dict[str, str]:
     """Return the files of the archive by name.
 
     Parameters
     ----------
     found
-        What the doctor found.
+        What the doctor found; None if it found nothing, because it failed.
     trouble
         What kept the study from being read, in words; empty for nothing.
     session
         Whose journals go in; None for none.
     folders
         The data folder first, then the study's.
+    patterns
+        Regular expressions of pseudonyms, beside those of the register.
     """
-    people = people_of(folders[0]) if folders[0].is_dir() else set()
+    missing = [] if found else ["what labcrane doctor finds: it failed"]
+    people, more = set[str](), set[str]()
+    if folders[0].is_dir():
+        people, more = _tried(
+            "pseudonyms of the data folder",
+            lambda: people_of(folders[0], missing),
+            (people, more),
+            missing,
+        )
     log, streams, states, unread = _read(session) if session else (SessionLog(), [], [], [])
     if log.context:
         people.add(DataFolder.pseudonym(str(log.context.get("participant", ""))))
-    clean = Cleaner(people - {""}, [found.computer, *_computers(log, streams)], folders)
-    installed = sorted({f"{each.name}-{each.version}" for each in distributions()}, key=str.lower)
+    computers = _tried(
+        "names of computers", lambda: list(_computers(log, streams)), list[str](), missing
+    )
+    computers += [found.computer] if found else []
+    clean = Cleaner(people - {""}, computers, folders, {*patterns, *more})
     files = {
-        "README.txt": README,
-        "versions.txt": clean.text("\n".join([*versions(), ""])),
-        "installed.txt": clean.text("\n".join([*installed, ""])),
-        "doctor.json": _json(clean.data(_findings(found, trouble))),
+        "versions.txt": lambda: clean.text("\n".join([*versions(), ""]), versions=True),
+        "installed.txt": installed,
+        "doctor.json": lambda: _json(_findings(found, trouble, clean)),
     }
-    if session is None:
-        return files
-    return files | {
-        "session/about.json": _json(clean.data(_about(session, log, states, unread))),
-        "session/timing.json": _json(_timing(log)),
-        "session/events.jsonl": "".join(
-            f"{json.dumps(clean.data(each), ensure_ascii=False)}\n" for each in _events(log)
-        ),
-        "session/streams.json": _json(clean.data([_stream(each) for each in streams])),
-    }
+    if session is not None:
+        files |= {
+            "session/about.json": lambda: _json(_about(session, log, states, unread, clean)),
+            "session/timing.json": lambda: _json(_timing(log)),
+            "session/events.jsonl": lambda: "".join(
+                f"{json.dumps(each, ensure_ascii=False)}\n" for each in _events(log, clean)
+            ),
+            "session/streams.json": lambda: _json([_stream(each, clean) for each in streams]),
+        }
+    made = {name: _tried(name, make, "", missing) for name, make in files.items()}
+    missing += [f"a journal of the session: {each.partition(':')[0]}" for each in unread]
+    lines = "".join(f"Missing: {each}.\n" for each in dict.fromkeys(missing))
+    return {"README.txt": f"{README}\n{lines}" if lines else README} | made
+
+
+def _tried(what: str, make: Callable[[], T], otherwise: T, missing: list[str]) -> T:
+    """Return what is made, or something else after adding it to what is missing, and why."""
+    try:
+        return make()
+    except Exception as error:  # noqa: BLE001 - any fault may be what the report is about
+        # The type alone: its text may have names in it.
+        missing.append(f"{what}: it cannot be read ({type(error).__name__})")
+        return otherwise
+
+
+def installed() -> str:
+    """Return the installed packages that labcrane needs, and how many others there are."""
+    there = {one_name(each.name): each for each in distributions() if each.name}
+    reached, due = set[str](), [PROJECT]
+    while due:
+        name = one_name(due.pop())
+        if name in there and name not in reached:
+            reached.add(name)
+            due += [
+                match[0]
+                for each in there[name].requires or ()
+                if (match := re.match(r"[\w.-]+", each)) is not None
+            ]
+    lines = [f"{name}-{there[name].version.partition('+')[0]}" for name in sorted(reached)]
+    return "\n".join([*lines, f"and {len(there) - len(reached)} others", ""])
 
 
 def check_new(path: Path) -> None:
@@ -374,59 +308,114 @@ def _computers(log: SessionLog, streams: Iterable[RecordedStream]) -> Iterator[s
     yield from (stream.header.host for stream in streams)
 
 
-def _findings(found: Diagnosis, trouble: Sequence[str]) -> dict[str, Any]:
+def _findings(found: Diagnosis | None, trouble: Sequence[str], clean: Cleaner) -> dict[str, Any]:
     """Return what the doctor found, without what names other computers on the network."""
+    why = [clean.text(each) for each in trouble]
+    if found is None:
+        return {"study_not_read": why}
     data = found.as_data()
-    del data["computer"]
-    for check in data["checks"]:
-        foreign = check["area"].startswith("lsl") and check["text"].startswith("stream ")
-        if foreign and not check["text"].endswith("is not announced"):
-            check["text"] = "(about a stream of another computer; left out)"
-            check["advice"] = ""
-    return {"study_not_read": list(trouble), **data}
-
-
-def _about(
-    session: FoundSession, log: SessionLog, states: Sequence[JournalState], unread: Sequence[str]
-) -> dict[str, Any]:
-    """Return what a session was made of, and how its journals were found."""
-    context = log.context
-    marker = read_crash_marker(
-        crash_marker_path(journal_path(session.folder, session.number, "run"))
-    )
-    components = context.get("components", {})
-    at_start = ((context.get("doctor") or {}).get("at_start") or {}).get("checks", [])
     return {
-        "session": session.number,
-        **{name: context[name] for name in ABOUT if name in context},
-        "components": {
-            part: {name: each.get(name) for name in ("use", "plugin")}
-            for part, each in components.items()
-        },
-        "doctor_at_start": at_start,
-        "journals": [asdict(each) for each in states],
-        "not_read": list(unread),
-        "process_was_last_in": str(marker or ""),
-        "events_counted": Counter(event.name for event in log.events),
+        "study_not_read": why,
+        "made": data["made"],
+        "verdict": data["verdict"],
+        "checks": _checks(data["checks"], clean),
+        "left_out": clean.data(data["left_out"]),
     }
 
 
-def _events(log: SessionLog) -> Iterator[dict[str, Any]]:
+def _checks(checks: Iterable[Mapping[str, Any]], clean: Cleaner) -> list[dict[str, str]]:
+    """Return lines of the doctor, but for those about streams of other computers."""
+    cleaned = list[dict[str, str]]()
+    for check in checks:
+        area, text, advice = (str(check[name]) for name in ("area", "text", "advice"))
+        if area.startswith("lsl") and text.startswith("stream "):
+            absent = text.endswith("is not announced")
+            text = "a stream is not announced" if absent else "(a stream of another computer)"
+            advice = advice if absent else ""
+        versions = area == "version"
+        cleaned.append(
+            {
+                "area": clean.text(area),
+                "verdict": str(check["verdict"]),
+                "text": clean.text(text, versions=versions),
+                "advice": clean.text(advice),
+            }
+        )
+    return cleaned
+
+
+def _about(
+    session: FoundSession,
+    log: SessionLog,
+    states: Sequence[JournalState],
+    unread: Sequence[str],
+    clean: Cleaner,
+) -> dict[str, Any]:
+    """Return what a session was made of, and how its journals were found."""
+    context = log.context
+    marker, why = None, [clean.traceback(each) for each in unread]
+    try:
+        marker = read_crash_marker(
+            crash_marker_path(journal_path(session.folder, session.number, "run"))
+        )
+    except Exception:  # noqa: BLE001 - any fault may be what the report is about
+        why.append(clean.traceback(f"crash marker: {traceback.format_exc()}"))
+    components = context.get("components", {})
+    at_start = ((context.get("doctor") or {}).get("at_start") or {}).get("checks", [])
+    about = {name: context[name] for name in ABOUT if name in context}
+    kept = {
+        name: clean.text(str(about.pop(name)), versions=True)
+        if isinstance(about.get(name), str)
+        else {
+            clean.text(str(of)): clean.text(str(version), versions=True)
+            for of, version in about.pop(name, {}).items()
+        }
+        for name in ("versions",)
+        if name in about
+    }
+    return {
+        "session": session.number,
+        **clean.data(about),
+        **kept,
+        "components": {
+            clean.text(part): {name: clean.data(each.get(name)) for name in ("use", "plugin")}
+            for part, each in components.items()
+        },
+        "doctor_at_start": _checks(at_start, clean),
+        "journals": [
+            # The name of a journal is the program's, but for a file that somebody renamed.
+            asdict(each) | {"name": each.name if session_of(Path(each.name)) else "(a path)"}
+            for each in states
+        ],
+        "not_read": why,
+        "process_was_last_in": clean.text(str(marker or "")),
+        "events_counted": dict(
+            sorted(Counter(clean.text(event.name) for event in log.events).items())
+        ),
+    }
+
+
+def _events(log: SessionLog, clean: Cleaner) -> Iterator[dict[str, Any]]:
     """Yield the events of the program, with seconds since the first one."""
     start = log.events[0].time if log.events else 0.0
     for event in log.events:
         if event.name in KEPT:
-            yield _event(event, start)
+            yield _event(event, start, clean)
 
 
-def _event(event: LoggedEvent, start: float) -> dict[str, Any]:
+def _event(event: LoggedEvent, start: float, clean: Cleaner) -> dict[str, Any]:
     kept = {name: event.data[name] for name in KEPT[event.name] if name in event.data}
     return {
         "s": round(event.time - start, 6),
         "tick": int(event.tick) if math.isfinite(event.tick) else None,
         "part": event.part,
         "event": event.name,
-        **kept,
+        **{
+            name: clean.name(value, NAMES[name])
+            if name in NAMES and isinstance(value, str)
+            else clean.data(value)
+            for name, value in kept.items()
+        },
     }
 
 
@@ -461,12 +450,12 @@ def _spread(values: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, float]:
     }
 
 
-def _stream(stream: RecordedStream) -> dict[str, Any]:
+def _stream(stream: RecordedStream, clean: Cleaner) -> dict[str, Any]:
     """Return how a stream of others came, without what it measured."""
     trips = stream.probes[:, 2]
     return {
-        "name": stream.header.name,
-        "type": stream.header.type,
+        "name": clean.name(stream.header.name, "stream"),
+        "type": clean.text(stream.header.type),
         "channels": len(stream.header.channels),
         "format": stream.header.format,
         "rate_hz": stream.header.rate_hz,
@@ -474,5 +463,5 @@ def _stream(stream: RecordedStream) -> dict[str, Any]:
         "probes": len(trips),
         "round_trip_ms": _spread(1e3 * trips) if len(trips) else None,
         "parts": len(stream.starts),
-        "notes_counted": Counter(str(note.data.get("event")) for note in stream.notes),
+        "notes_counted": Counter(clean.text(str(note.data.get("event"))) for note in stream.notes),
     }

@@ -2,6 +2,7 @@
 
 import json
 import platform
+import random
 import shutil
 import socket
 import zipfile
@@ -14,7 +15,8 @@ from governance.test_commands import Terminal
 from rehearsal import ScriptedConsole
 
 from labcrane.cli.app import main
-from labcrane.cli.problem_report import KEPT, Cleaner
+from labcrane.cli.cleaner import Cleaner
+from labcrane.cli.problem_report import KEPT
 from labcrane.core.findings import Finding, Verdict
 from labcrane.core.records import Event
 from labcrane.doctor.report import Check
@@ -146,30 +148,54 @@ def test_nothing_of_people_is_in_any_byte_of_the_report_of_a_killed_session(kill
 @pytest.mark.parametrize(
     ("text", "clean"),
     [
-        (f"cannot write '/home/anna/{FOLDER}/data/QX417/QX417.h5'", "…/participant-1.h5"),
-        ("in /home/anna", "in …/user"),
-        ("in C:\\Users\\Anna B\\labor\\own.py, line 3", "in …/own.py, line 3"),
-        ("-I/home/anna/include", "…/user/include"),
-        ("on \\\\server\\share\\x.h5", "on …/x.h5"),
-        ("~/thesis/own.py:7", "…/own.py:7"),
+        (f"cannot write '/home/anna/{FOLDER}/data/QX417/QX417.h5'", "cannot write '(a path).h5'"),
+        ("in /home/anna", "in (a path)"),
+        ("in C:\\Users\\Anna B\\labor\\own.py, line 3", "in (a path).py, line 3"),
+        ("on \\\\server\\share\\x.h5", "on (a path).h5"),
+        ("~/thesis/own.py:7", "(a path).py:7"),
         ("port /dev/ttyUSB0 and/or 2 m/s", "port /dev/ttyUSB0 and/or 2 m/s"),
         ("Linux-5.15.167.4-generic", "Linux-5.15.167.4-generic"),
         ("data/QX417-SIMULATED/ses-01", "data/participant-1-SIMULATED/ses-01"),
-        ("QX4177 is another one", "QX4177 is another one"),
-        ("labcrane/onion/qx417/ses-01", "labcrane/onion/participant-1/ses-01"),
+        ("QX4177 is another one", "word-1 is another one"),
+        ("labcrane/onion/qx417/ses-01", "labcrane/word-1/participant-1/ses-01"),
+        ("QX998 and QX417", "pseudonym-1 and participant-1"),
+        ("'rat_hz' is not a key of the file", "(a text) is not a key of the file"),
+        (
+            "plugin 'labcrane_bullet' failed with '3'",
+            "plugin 'labcrane_bullet' failed with (a number)",
+        ),
+        ("Mark Will paused", "word-1 word-2 paused"),
+        ("PermissionError: Permission denied", "PermissionError: Permission denied"),
         (f"{USER}@{HOST.upper()}", "user@computer"),
         ("page http://192.168.1.4:8080/?key=1", "page (an address)"),
         ("10.0.0.7 or fe80::1:2", "(an address) or (an address)"),
         ("sent to 10.0.0.7.", "sent to (an address)."),
-        ("mail anna@example.org now", "mail (an e-mail address) now"),
+        ("mail anna@example.org now", "mail (an address) now"),
         ("at 12:30:45, 2026-11-27", "at 12:30:45, 2026-11-27"),
     ],
 )
 def test_a_text_is_cleaned_of_people_computers_and_folders(
     here: Path, text: str, clean: str
 ) -> None:
-    cleaned = Cleaner([PERSON], [], [here / "data"]).text(text)
-    assert cleaned.removeprefix("cannot write '").removesuffix("'").removeprefix("-I") == clean
+    assert Cleaner([PERSON], [], [here / "data"], [r"QX\d{3}"]).text(text) == clean
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "labcrane 0.1.17 of 2026-11-17, at 17:17:17",
+        "the clock advances in steps of 17 ns, 240 Hz, 17 %",
+        "(labcrane_bullet/bullet.py:17), line 17",
+    ],
+)
+def test_versions_dates_times_and_lines_stay_beside_numeric_pseudonyms(text: str) -> None:
+    assert Cleaner(["17"], [], [Path("/studies/240/data")], [r"\d{2}"]).text(text) == text
+
+
+def test_a_bare_number_that_may_be_a_pseudonym_is_replaced() -> None:
+    clean = Cleaner(["17"], [], [Path("/studies/240/data")], [r"\d{2}"])
+    assert clean.text("of 17 and 18, 240") == "of (a number) and (a number), 240"
+    assert clean.text("data/17/ses") == "data/(a number)/ses"
 
 
 def test_without_a_terminal_nothing_is_written_unless_yes_is_said(
@@ -259,7 +285,7 @@ def test_a_study_that_cannot_be_read_is_reported_with_the_reason(here: Path) -> 
     protocol.write_text(protocol.read_text().replace("rate_hz", "rat_hz"), encoding="utf-8")
     archive = report("--protocol", here, "--yes")
     (why,) = json.loads(file_of(archive, "doctor.json"))["study_not_read"]
-    assert "'rat_hz' is not a key of the file" in why
+    assert "(a text) is not a key of the file" in why
     assert planted_in(archive) == []
 
 
@@ -282,3 +308,89 @@ def test_a_file_that_is_there_is_not_overwritten(capsys: pytest.CaptureFixture[s
     report("--yes", status=1)
     assert "report.zip is there already; give another name with --to" in capsys.readouterr().err
     assert Path("report.zip").read_text() == "kept"
+
+
+def drawn(rng: random.Random) -> str:
+    """A name as people have them, that nobody has."""
+    letters = rng.choices("bcdfghjklmnpqrstvwxz", k=4)
+    return "".join(f"{each}{rng.choice('aeiouyäö')}" for each in letters).title()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_value_planted_in_a_free_text_is_in_any_byte(
+    here: Path, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = random.Random(seed)
+    names = [drawn(rng) for _ in range(14)]
+    person, other = (f"QX{number}" for number in rng.sample(range(100, 1000), 2))
+    why = iter([*names, *names])
+    said = (
+        f"ValueError: {next(why)} said '{next(why)}, {next(why)}' of {other} in "
+        f'/srv/{next(why)} {next(why)}/{next(why).lower()}.py ("{next(why)}")'
+    )
+    events = (
+        Event("session.failed", 6.0, {"why": said}),
+        Event("plugin.slow", 6.5, {"why": f"{next(why).lower()} {next(why)}_{next(why)}"}),
+        Event("stream.lost", 7.0, {"what": f"{next(why)} EEG"}),
+        Event("signal.bad", 7.5, {"stream": next(why), "channel": next(why), "kind": "flat"}),
+        Event("feedback.ready", 8.0, {"what": "view", "facts": {next(why): [next(why)]}}),
+    )
+    a_journal(here / "data" / person, events=events)
+    found = (Check("lsl", Finding(Verdict.FAIL, f"stream {names[0]}", f"ask {names[1]}")),)
+    monkeypatch.setattr("labcrane.doctor.checks.examine", lambda *_, **__: found)
+    archive = report("--protocol", a_protocol(here), "--data", here / "data", "--yes")
+    everything = bytes_of(archive)
+    planted = [person, other, *(part for name in names for part in (name, name.lower()))]
+    there = [each for each in planted if each.lower().encode() in everything]
+    assert there == []
+    failed = next(each for each in events_of(archive) if each["event"] == "session.failed")
+    assert str(failed["why"]).startswith("ValueError: word-")
+
+
+def test_the_source_of_a_plugin_that_failed_is_not_in_a_traceback() -> None:
+    text = (
+        "Traceback (most recent call last):\n"
+        '  File "/home/anna/thesis/own.py", line 3, in of_anna\n'
+        '    raise ValueError("Anna is ill")\n'
+        "ValueError: Anna is ill"
+    )
+    assert Cleaner([], [], []).traceback(text).splitlines() == [
+        "Traceback (most recent call last):",
+        "  (a path).py, line 3, in word-1",
+        "ValueError: word-2 is word-3",
+    ]
+
+
+def test_a_damaged_register_gives_an_archive_that_says_it_is_missing(here: Path) -> None:
+    register = here / "data" / "register" / "register.json"
+    register.parent.mkdir(parents=True)
+    register.write_text('{"participants": {"' + PERSON, encoding="utf-8")
+    a_journal(here / "data" / PERSON)
+    archive = report("--yes")
+    assert "Missing: the register: it cannot be read (RecordingError).\n" in file_of(
+        archive, "README.txt"
+    )
+    assert planted_in(archive) == []
+
+
+def test_a_doctor_that_fails_gives_an_archive_that_says_it_is_missing(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object, **__: object) -> None:
+        raise UnicodeDecodeError("utf-8", PERSON.encode(), 0, 1, NOTE)
+
+    monkeypatch.setattr("labcrane.doctor.checks.examine", fails)
+    archive = report("--yes")
+    said = file_of(archive, "README.txt")
+    assert "Missing: what labcrane doctor finds: it failed.\n" in said
+    (why,) = json.loads(file_of(archive, "doctor.json"))["study_not_read"]
+    assert why.startswith("labcrane doctor failed: UnicodeDecodeError: ")
+    assert planted_in(archive) == []
+
+
+def test_a_protocol_that_is_no_text_gives_an_archive(here: Path) -> None:
+    protocol = a_protocol(here)
+    protocol.write_bytes(b"\xff\xfe\x00" + PERSON.encode())
+    archive = report("--protocol", protocol, "--yes")
+    assert json.loads(file_of(archive, "doctor.json"))["study_not_read"]
+    assert planted_in(archive) == []

@@ -197,7 +197,13 @@ def report_problem(
     It is shown before it is written. It has the doctor's findings, versions, and the events and
     timing of the last session: no answers, notes, pseudonyms, users, computers or folders.
     """
-    from labcrane.cli.problem_report import check_new, compose, find_session, write
+    from labcrane.cli.problem_report import (
+        check_new,
+        compose,
+        find_session,
+        pattern_of,
+        write,
+    )
     from labcrane.files.names import absent
 
     if local:
@@ -212,7 +218,8 @@ def report_problem(
     found_session = find_session(folder, session)
     found, trouble = _examined(protocol, folder)
     study_folder = protocol.parent if protocol else Path()
-    files = compose(found, trouble, found_session, (folder, study_folder))
+    patterns = pattern_of(protocol) if protocol else ()
+    files = compose(found, trouble, found_session, (folder, study_folder), patterns)
     if show is not None:
         if show not in files:
             raise ProtocolError(f"--show {show}: {nearest(show, files, 'the archive has')}")
@@ -228,22 +235,26 @@ def report_problem(
     out.print(f"written: {to}", markup=False)
 
 
-def _examined(protocol: Path | None, folder: Path) -> tuple["Diagnosis", Sequence[str]]:
+def _examined(protocol: Path | None, folder: Path) -> tuple["Diagnosis | None", Sequence[str]]:
     """Return what the doctor finds, and why a study could not be read: both belong to a report."""
     from labcrane.doctor.checks import examine, left_out
     from labcrane.doctor.report import diagnosis
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
 
-    registry, study, trouble = discover(), None, list[str]()
-    if protocol is not None:
-        try:
-            with_own = discover(study=protocol)
-            study, registry = load(protocol, with_own), with_own
-        except LabcraneError as error:
-            trouble.append(str(error))
-    found = diagnosis(examine(folder, registry, study), left_out(registry, study))
-    return found, trouble
+    study, trouble = None, list[str]()
+    try:
+        registry = discover()
+        if protocol is not None:
+            try:
+                with_own = discover(study=protocol)
+                study, registry = load(protocol, with_own), with_own
+            except Exception as error:  # noqa: BLE001 - any fault may be what the report is about
+                known = isinstance(error, LabcraneError)
+                trouble.append(str(error) if known else f"{type(error).__name__}: {error}")
+        return diagnosis(examine(folder, registry, study), left_out(registry, study)), trouble
+    except Exception as error:  # noqa: BLE001 - as above
+        return None, [*trouble, f"labcrane doctor failed: {type(error).__name__}: {error}"]
 
 
 def _print_files(files: Mapping[str, str]) -> None:
