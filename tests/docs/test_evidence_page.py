@@ -1,7 +1,9 @@
 """Pages say of systems and wheels what the record of the stages says, and nothing else."""
 
 import json
+import os
 import re
+import subprocess
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
@@ -47,7 +49,7 @@ def rows(table: str, system: str) -> list[list[str]]:
 def after(folder: Path, stage: str, *runs: dict[str, Any], ending: str = "passed") -> Any:
     path = folder / "runs"
     path.write_text("".join(json.dumps(run) + "\n" for run in runs), encoding="utf-8")
-    return EVIDENCE.kept(NOTHING, stage, ending, "12", path)
+    return EVIDENCE.kept(NOTHING, stage, ending, "12", path, "abc1234")
 
 
 def test_the_pages_are_those_of_the_record() -> None:
@@ -76,7 +78,7 @@ def test_a_stage_is_kept_for_each_system_and_python_that_it_ran_on(tmp_path: Pat
     assert by_python["3.11"][2] == "no run recorded"
     assert record["stages"]["pythons"]["ended"] == "failed"
     assert record["stages"]["pythons"]["passed"] == 14
-    assert re.fullmatch(r"[0-9a-f]{7,}", by_python["3.14"][-1])
+    assert by_python["3.14"][-1] == "abc1234"
 
 
 def test_a_run_on_any_python_of_a_system_replaces_the_row_that_says_there_was_none(
@@ -89,7 +91,7 @@ def test_a_run_on_any_python_of_a_system_replaces_the_row_that_says_there_was_no
 def test_a_newer_run_of_a_stage_takes_the_place_of_the_older_one(tmp_path: Path) -> None:
     old = after(tmp_path, "pythons", RUN, RUN | {"python": "3.12.1"})
     (tmp_path / "runs").write_text(json.dumps(RUN | {"passed": 9}) + "\n", encoding="utf-8")
-    new = EVIDENCE.kept(old, "pythons", "passed", "1", tmp_path / "runs")
+    new = EVIDENCE.kept(old, "pythons", "passed", "1", tmp_path / "runs", "abc1234")
     assert [(one["python"], one["passed"]) for one in new["systems"]] == [("3.12", 7), ("3.14", 9)]
 
 
@@ -129,3 +131,64 @@ def test_every_stage_of_the_nightly_run_has_a_row() -> None:
     known = re.search(r'^known="(.+?)" of_gate="(.+?)"$', nightly, re.M)
     assert known
     assert [*known[1].split(), *known[2].split()] == list(EVIDENCE.STAGES)
+
+
+def test_a_python_that_is_not_there_is_noted_as_not_tried_with_the_reason(tmp_path: Path) -> None:
+    runs = tmp_path / "runs"
+    done = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", ". .ci/stages; installed_on 3.99; on_python 3.99"],
+        env={**os.environ, "LABCRANE_RUNS": str(runs)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    (line,) = EVIDENCE.lines_of(runs)
+    assert line["untried"] == "this computer has no Python 3.99"
+    record = EVIDENCE.kept(NOTHING, "pythons", "passed", "1", runs, "abc1234")
+    why = "not tried: this computer has no Python 3.99"
+    assert record["stages"]["pythons"]["ended"] == why
+    (row,) = (row for row in rows(EVIDENCE.systems_table(record), "Linux") if row[0] == "3.99")
+    assert row[3:7] == [why, "0", "0", "0"]
+
+
+def test_a_stage_that_passed_in_part_names_what_was_not_tried(tmp_path: Path) -> None:
+    missing = EVIDENCE.untried("Linux", "3.12", "quick tests", "this computer has no Python 3.12")
+    record = after(tmp_path, "pythons", RUN, missing)
+    why = "not tried: this computer has no Python 3.12"
+    assert record["stages"]["pythons"]["ended"] == f"passed; {why}"
+    assert {run["python"]: run["ended"] for run in record["systems"]} == {
+        "3.14": "passed",
+        "3.12": why,
+    }
+
+
+@pytest.mark.parametrize(
+    "stage", [name for name in EVIDENCE.STAGES if name not in EVIDENCE.UNCOUNTED]
+)
+@pytest.mark.parametrize("runs", [[], [RUN | {"passed": 0}]], ids=["no run", "none passed"])
+def test_a_stage_in_which_no_test_passed_is_not_passed(
+    tmp_path: Path, stage: str, runs: list[dict[str, Any]]
+) -> None:
+    record = after(tmp_path, stage, *runs)
+    assert record["stages"][stage]["ended"] == "not tried: no test ran"
+    assert {run["ended"] for run in record["systems"]} <= {"not tried: no test ran"}
+
+
+def test_wheels_that_nothing_resolved_are_not_passed(tmp_path: Path) -> None:
+    record = after(tmp_path, "wheels")
+    assert record["stages"]["wheels"]["ended"] == "not tried: nothing was resolved"
+
+
+def test_no_row_of_the_record_has_passed_without_a_test() -> None:
+    counted = [*RECORD["systems"]]
+    counted += [one for name, one in RECORD["stages"].items() if name not in EVIDENCE.UNCOUNTED]
+    assert [one for one in counted if one["ended"].startswith("passed") and not one["passed"]] == []
+
+
+def test_the_nightly_run_reads_the_commit_before_the_stage_begins() -> None:
+    lines = (ROOT / ".ci" / "nightly").read_text(encoding="utf-8").splitlines()
+    (read,) = (at for at, line in enumerate(lines) if "git rev-parse --short HEAD" in line)
+    (began,) = (at for at, line in enumerate(lines) if 'stages "$2"' in line)
+    assert read < began
+    assert "rev-parse" not in (ROOT / ".ci" / "evidence").read_text(encoding="utf-8")
