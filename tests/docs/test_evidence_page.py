@@ -4,6 +4,7 @@ import json
 import os
 import re
 import subprocess
+import tomllib
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
@@ -192,3 +193,52 @@ def test_the_nightly_run_reads_the_commit_before_the_stage_begins() -> None:
     (began,) = (at for at, line in enumerate(lines) if 'stages "$2"' in line)
     assert read < began
     assert "rev-parse" not in (ROOT / ".ci" / "evidence").read_text(encoding="utf-8")
+
+
+def passed_pythons() -> set[str]:
+    """Pythons on which tests of a recorded run have passed."""
+    return {run["python"] for run in RECORD["systems"] if run["passed"]}
+
+
+def test_classifiers_name_the_pythons_and_systems_that_a_recorded_run_shows() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    named = {
+        each.rpartition(" :: ")[2]
+        for each in project["classifiers"]
+        if each.startswith(("Programming Language :: Python :: 3.", "Operating System ::"))
+    }
+    assert named == passed_pythons()
+
+
+SYSTEM = re.compile(r"\b(Windows|Wine|macOS)\b")
+CLAIM = re.compile(r"\b(pass(es|ed)?|tried|tested|runs|ran|works|(is|are) (re)?played|those of)\b")
+
+
+def claims(page: str, tried: set[str]) -> list[str]:
+    """Sentences that say what happens on a system where nothing was run."""
+    sentences = re.split(r"(?<=[.:;])\s+", " ".join(page.split()))
+    return [
+        each
+        for each in sentences
+        if "not tried" not in each and CLAIM.search(each) and set(SYSTEM.findall(each)) - tried
+    ]
+
+
+@pytest.mark.parametrize(
+    "claim",
+    [
+        "So a session that was recorded on Linux is replayed on Windows within rounding.",
+        "Under Wine, 3 of 3 tests of a study day passed.",
+        "It works on macOS.",
+    ],
+)
+def test_a_claim_without_a_run_is_found(claim: str) -> None:
+    assert claims(f"The gate checks types. {claim}", {"Linux"}) == [claim]
+
+
+def test_pages_claim_nothing_of_a_system_without_a_recorded_run() -> None:
+    tried = {run["system"] for run in RECORD["systems"] if run["passed"]}
+    page = EVIDENCE.COMPATIBILITY.read_text(encoding="utf-8")
+    for part in ("systems", "wheels"):
+        page = EVIDENCE.with_part(page, part, "")
+    assert claims(page, tried) == []
