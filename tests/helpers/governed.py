@@ -80,7 +80,17 @@ def edit(path: Path, old: str, new: str) -> None:
 class Willing(ScriptedConsole):
     """Starts whatever waits, and gives the orders of a script."""
 
+    def __init__(self, orders=None) -> None:
+        super().__init__(orders)
+        self._waits = False
+
+    def report(self, event) -> None:
+        super().report(event)
+        self._waits = self._waits or event.name == "waiting"
+
     def commands(self):
         from labcrane.session.commands import Command, Order
 
-        return [Command(Order.START), *super().commands()]
+        start = [Command(Order.START)] * self._waits
+        self._waits = False
+        return [*start, *super().commands()]

@@ -147,19 +147,23 @@ def test_a_glance_has_the_areas_of_the_newest_picture_and_the_smallest_one_that_
     film = Film(record, "gazed")
     eyes, pictures = record.streams["eyes"], record.streams["labcrane.feedback.operator.areas"]
     assert film.glances.known
+    boxes = {
+        name: pictures.data[[f"{name}.{s}" for s in ("left", "top", "right", "bottom")]].to_numpy(
+            float
+        )
+        for name in AREAS
+    }
+    gaze = eyes.data[["gaze_x", "gaze_y"]].to_numpy()
     looked = set()
     for at in [0.2, 9.0, *moments(film.length, 600)]:
         now = film.start + at
         glance = film.glances.at(at)
-        rows = pictures.data[pictures.time <= now + 1e-9]
-        wanted = {}
-        for name in AREAS if len(rows) else ():
-            box = rows.iloc[-1][[f"{name}.{s}" for s in ("left", "top", "right", "bottom")]]
-            if np.isfinite(box.to_numpy(float)).all():
-                wanted[name] = tuple(box)
+        shown = pictures.time <= now + 1e-9
+        newest = {name: tuple(box[shown][-1]) for name, box in boxes.items() if shown.any()}
+        wanted = {name: box for name, box in newest.items() if np.isfinite(box).all()}
         assert glance.areas == wanted
         during = (eyes.time > now - 0.5) & (eyes.time <= now + 1e-9)
-        trail = eyes.data[["gaze_x", "gaze_y"]].to_numpy()[during]
+        trail = gaze[during]
         assert abs(len(glance.trail) - len(trail)) <= 1, "a sample at the very edge"
         if not len(trail):
             assert glance.looked == ""

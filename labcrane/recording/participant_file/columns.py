@@ -76,9 +76,15 @@ def holds_texts(dataset: "h5py.Dataset") -> bool:
 
 
 def texts_of(dataset: "h5py.Dataset") -> npt.NDArray[np.object_]:
-    """Return a column of texts."""
-    texts: npt.NDArray[np.object_] = dataset.asstr("utf-8")[:]
-    return texts
+    """Return a column of texts.
+
+    Chunk by chunk: all texts have the length of the longest, so that thousands of short events
+    beside a long one would need hundreds of megabytes.
+    """
+    if dataset.chunks is None or not len(dataset):
+        return np.asarray(dataset.asstr("utf-8")[:], object)
+    texts = dataset.asstr("utf-8")
+    return np.concatenate([np.asarray(texts[part], object) for part in dataset.iter_chunks()])
 
 
 def text_of(dataset: "h5py.Dataset") -> str:
