@@ -125,7 +125,7 @@ def about(study: Study, question: CheckQuestion) -> Finding:
         "key": question.key,
         "text": question.text,
         "message": question.whole,
-        "whole": f"{study.path}:{line}:{column}: question: {question.whole}",
+        "whole": f"{study.path}:{line}:{column}: warning: {question.whole}",
     }
 
 

@@ -40,7 +40,7 @@ def test_the_variant_for_the_keyboard_is_the_study_but_for_the_controls(
     protocol: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["check", str(protocol.with_name("keyboard.yaml"))]) == 0
-    assert "question" not in capsys.readouterr().out
+    assert "warning" not in capsys.readouterr().out
     study, variant = (
         YAML(typ="safe").load(protocol.with_name(name))
         for name in ("protocol.yaml", "keyboard.yaml")

@@ -222,7 +222,7 @@ def test_check_warns_of_an_error_that_every_group_is_shown(
     path.write_text(SHORT + "views: {cab: {use: view, hud: [trial, distance]}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     said = capsys.readouterr()
-    assert "question: views.cab.hud has distance, which shows the operator the task's" in said.out
+    assert "warning: views.cab.hud has distance, which shows the operator the task's" in said.out
     always = "views: {cab: {use: view, patch: {on: [target.entered]}}}\n"
     path.write_text(SHORT + always, encoding="utf-8")
     assert main(["check", str(path)]) == 0
@@ -230,10 +230,10 @@ def test_check_warns_of_an_error_that_every_group_is_shown(
     path.write_text(SHORT + "views: {hum: {use: sonification}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     assert (
-        "question: views.hum: sonification tells how far the tip is from the target, up to 4 m and "
+        "warning: views.hum: sonification tells how far the tip is from the target, up to 4 m and "
         "on which side the target is and whether the tip is inside the target, in every group and "
         "block; put it under feedback, where the design says who is given it"
     ) in capsys.readouterr().out
     path.write_text(SHORT + "views: {cab: {use: view, patch: {}}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
-    assert "question" not in capsys.readouterr().out
+    assert "warning" not in capsys.readouterr().out

@@ -470,8 +470,8 @@ def test_people_and_programs_are_asked_the_same_with_the_line(
     printed = capsys.readouterr()
     assert printed.err == ""  # a question is a result of a check, as that it is fine
     said, fine = printed.out.splitlines()
-    assert fine.endswith("; 1 question is asked above")
-    assert said.startswith(f"{path}:4:10: question: rate_hz is 10 Hz, at which")
+    assert fine.endswith("; 1 warning above")
+    assert said.startswith(f"{path}:4:10: warning: rate_hz is 10 Hz, at which")
     assert "(if it is, write expected: [rate_hz])" in said
     assert main(["check", path, "--json"]) == 0
     (finding,) = json.loads(capsys.readouterr().out)["findings"]
@@ -612,18 +612,18 @@ def test_nothing_is_locked_or_amended_while_something_is_asked(
         return " ".join(capsys.readouterr().err.split())
 
     said = refused("approve", path, *granted)
-    assert ":4:10: question: rate_hz is 10 Hz" in said
+    assert ":4:10: warning: rate_hz is 10 Hz" in said
     assert said.endswith("nothing was locked; answer the warnings above first")
     assert not lock.exists()
     asking = study.path.read_text()
     keys = re.findall(r"if it is, write expected: \[(.+?)\]", said)
-    assert len(keys) == said.count(": question: ") > 0
+    assert len(keys) == said.count(": warning: ") > 0
     answered = asking.replace("rate_hz: 10", f"rate_hz: 10\nexpected: {keys}")
     study.path.write_text(answered)
     assert main(["approve", path, *granted]) == 0
     locked = lock.read_text()
     study.path.write_text(asking)
-    assert ":4:10: question: rate_hz is 10 Hz" in refused(*amendment)
+    assert ":4:10: warning: rate_hz is 10 Hz" in refused(*amendment)
     study.path.write_text(answered)
     cue.write_text(BROKEN)
     assert "rehearsal, session 'only': cue 'ball'" in refused(*amendment)

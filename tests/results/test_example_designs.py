@@ -36,7 +36,7 @@ def test_a_check_asks_nothing_about_a_design(name: str, capsys: pytest.CaptureFi
     assert main(["check", str(DESIGNS / name)]) == 0
     said = capsys.readouterr()
     assert f"study '{name}' is fine" in said.out
-    assert "question" not in said.out + said.err
+    assert "warning" not in said.out + said.err
 
 
 @pytest.mark.parametrize("name", ["crossover", "washout"])

@@ -76,7 +76,7 @@ def test_a_folder_stands_for_its_protocol(
     assert main(["check", str(FOLDER)]) == 0
     said = capsys.readouterr()
     assert "study 'crane_pilot' is fine" in said.out
-    assert "question" not in said.out + said.err
+    assert "warning" not in said.out + said.err
     assert main(["check", str(tmp_path)]) == 2
     assert (
         f"there is no protocol.yaml in {tmp_path}; give the study's YAML" in capsys.readouterr().err

@@ -77,7 +77,7 @@ def check(
     sessions = len(study.protocol.sessions)
     done = ", and was rehearsed" if rehearse else ""
     if told:
-        done += f"; {len(told)} question{'s are' if len(told) > 1 else ' is'} asked above"
+        done += f"; {len(told)} warning{'s' if len(told) > 1 else ''} above"
     # One plain line, for which rich is not worth loading.
     typer.echo(
         f"{protocol}: study {study.protocol.study!r} is fine: {sessions} "
