@@ -110,8 +110,8 @@ def a_session(
 
 def link_of(launcher: "subprocess.Popen[str]") -> str:
     """Return the link of the experimenter's page, as the launcher prints it."""
-    said = (line for line in launcher.stdout if "supervisor page: " in line)
-    return next(said).split("supervisor page: ")[1].split()[0]
+    said = (line for line in launcher.stdout if "experimenter's page: " in line)
+    return next(said).split("experimenter's page: ")[1].split()[0]
 
 
 def watch(browser: object, link: str) -> None:

@@ -11,6 +11,7 @@ from labcrane.core.records import Event
 from labcrane.errors import DeviceError
 from labcrane.processes.handle import Patience, ProcessHandle
 from labcrane.session.commands import Command
+from labcrane.web.door.access import NAMES
 from labcrane.web.service import Closed, Opened, PageConfig, Report, Served, Streams, Used
 from labcrane.web.state import SessionLeft
 
@@ -144,7 +145,7 @@ class PageHandle:
         if isinstance(message, Served):
             if not self._served:
                 for page, link in self.links().items():
-                    self._say(f"{page} page: {link}")
+                    self._say(f"{NAMES[page]}'s page: {link}")
             self._served = True
         elif isinstance(message, Used):
             self._order.keys.tokens.pop(message.page, None)

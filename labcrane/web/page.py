@@ -8,7 +8,7 @@ from labcrane.design.plan import SessionPlan
 from labcrane.limits import LIMITS
 from labcrane.protocol.study import Study
 from labcrane.session.commands import Command, Order, beyond_limits
-from labcrane.web.door.access import PARTICIPANT, RIGHTS
+from labcrane.web.door.access import NAMES, PARTICIPANT, RIGHTS
 from labcrane.web.door.denials import Bucket
 from labcrane.web.live import Live
 from labcrane.web.pictures import Pictures
@@ -88,7 +88,7 @@ class PageContext:
         if why is None:
             self.send(command)
             return ""
-        why = f"the {page} page asked for {order.value}: {why}"
+        why = f"the {NAMES[page]}'s page asked for {order.value}: {why}"
         self.denied(why)
         return why
 

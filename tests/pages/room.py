@@ -22,6 +22,7 @@ from simple_crane import FORM
 
 from labcrane.launcher import session_process
 from labcrane.web import service
+from labcrane.web.door.access import NAMES
 
 STUDY = (
     """\
@@ -68,8 +69,9 @@ class Room:
             self.said.append(line)
 
     def links(self) -> dict[str, str]:
-        found = re.findall(r"(\w+) page: (https?://\S+)", "".join(self.said))
-        return dict(found)
+        found = re.findall(r"(\w+)'s page: (https?://\S+)", "".join(self.said))
+        page_of = {name: page for page, name in NAMES.items()}
+        return {page_of[name]: link for name, link in found}
 
     def process(self, word: str) -> psutil.Process | None:
         """Return the session's process, or that of the pages once it serves them."""

@@ -11,6 +11,7 @@ from recording.test_outdated import faulty
 from labcrane import ProtocolError
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
+from labcrane.web.door.access import NAMES
 from labcrane.web.handle import PageHandle, free_port
 from labcrane.web.service import PageConfig
 from labcrane.web.state import SessionLeft
@@ -41,7 +42,7 @@ def test_pages_show_a_session_whose_protocol_would_be_refused_today(tmp_path: Pa
     link = pages.links()["supervisor"]
     try:
         wait_for(lambda: len(said) >= len(pages.links()))
-        assert said == [f"{page} page: {each}" for page, each in pages.links().items()]
+        assert said == [f"{NAMES[page]}'s page: {each}" for page, each in pages.links().items()]
         status, cookie, _ = answer(port, link.partition(str(port))[2])
         assert status == 303
         status, _, shown = answer(port, "/supervisor", cookie.partition(";")[0])

@@ -135,7 +135,7 @@ def test_a_refusal_says_why_and_gives_nothing_away(visited) -> None:
     text = answers["no token"][2]
     assert text == "labcrane: no token; use the link that labcrane has printed"
     assert answers["participant's order"][2] == (
-        "the participant page asked for end: no right to order it"
+        "the participant's page asked for end: no right to order it"
     )
 
 
@@ -148,8 +148,8 @@ def test_every_refusal_is_in_the_record(visited) -> None:
         "127.0.0.1 asked for /supervisor: no token",
         "127.0.0.1 asked for /supervisor: a wrong or used token",
         "127.0.0.1 asked for /supervisor: no right to see it",
-        "the participant page asked for end: no right to order it",
-        *(f"the supervisor page asked for {word}: no right to order it" for word in NOBODYS),
+        "the participant's page asked for end: no right to order it",
+        *(f"the experimenter's page asked for {word}: no right to order it" for word in NOBODYS),
         "127.0.0.1 asked for /_nicegui_ws/socket.io/: no token",
     ):
         assert why in denied

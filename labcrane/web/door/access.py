@@ -12,6 +12,7 @@ from starlette.responses import PlainTextResponse, RedirectResponse
 from labcrane.session.commands import Order
 
 SUPERVISOR, PARTICIPANT = "supervisor", "participant"
+NAMES = {SUPERVISOR: "experimenter", PARTICIPANT: "participant"}
 
 RIGHTS: Mapping[str, frozenset[Order]] = {
     SUPERVISOR: frozenset(Order) - {Order.DENIED},
