@@ -209,7 +209,7 @@ def check_carried(tracks: Mapping[str, Track], carried: Iterable[Response]) -> N
     for each in carried:
         if each.track in tracks and each.level not in tracks[each.track].levels:
             raise ProtocolError(
-                f"track {each.track!r} goes on from an earlier session, which had its level "
+                f"track {each.track!r} continues from an earlier session, which had its level "
                 f"{each.level!r}, and it has {', '.join(tracks[each.track].levels)}; give it back, "
                 "or start again with carry: false"
             )

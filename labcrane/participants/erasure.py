@@ -127,7 +127,7 @@ def mentions(places: Places, participant: str) -> tuple[list[str], list[str]]:
     """Return files with the pseudonym in name or content, and files that could not be searched.
 
     Of the data folder, and of all exports. What is packed is opened. The register is left out: it
-    keeps the tombstone.
+    keeps the erasure record.
     """
     register = read(places)
     names = Mentions({*register.names(), participant})

@@ -42,7 +42,7 @@ def inventory(places: Places, participant: str) -> list[InventoryEntry]:
     if participant in register.participants:
         found.append(InventoryEntry("register", str(places.register), HERE))
     if any(stone.participant == participant for stone in register.tombstones):
-        found.append(InventoryEntry("register", str(places.register), "tombstone: was erased"))
+        found.append(InventoryEntry("register", str(places.register), "erasure record: was erased"))
     for export in register.exports:
         if not concerns(export, participant):
             continue

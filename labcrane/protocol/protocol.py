@@ -116,10 +116,10 @@ class OnFault(Section):
 
     feedback_lost: Literal["restart", "continue", "pause"] = "restart"
     """A view or sound fails: restart it, continue without it, or pause until it is back. One that
-    cannot be started in the first place stops the session, unless it is to go on without."""
+    cannot be started in the first place stops the session, unless it is set to continue without."""
 
     session_died: Literal["continue", "redo_trial", "redo_block"] = "redo_trial"
-    """The session's process died: where ``labcrane resume`` goes on."""
+    """The session's process died: where ``labcrane resume`` continues."""
 
 
 class Protocol(Section):

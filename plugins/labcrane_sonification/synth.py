@@ -87,7 +87,7 @@ def _check_portaudio(device: int | None) -> None:
     if pyo.pa_get_default_output() < 0 or not numbers:
         raise DeviceError(
             "there is no sound output device; connect one, use driver: jack, or write "
-            "on_fault: {feedback_lost: continue} to go on without sound"
+            "on_fault: {feedback_lost: continue} to continue without sound"
         )
     if device is not None and device not in numbers:
         known = ", ".join(f"{n} {name}" for n, name in zip(numbers, names, strict=True))

@@ -214,7 +214,7 @@ def test_where_lists_every_file_that_holds_a_person(
     assert "P001/" not in said
     recovery.erase(lab.places, "P0011", REASON, TODAY)
     (each,) = inventory(lab.places, "P0011")
-    assert each.state == "tombstone: was erased"
+    assert each.state == "erasure record: was erased"
 
 
 BY_OTHER_MEANS = {"score", "operator fit", "power"}

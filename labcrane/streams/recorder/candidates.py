@@ -69,7 +69,7 @@ def answered(text: str, streams: Sequence[Mapping[str, Any]]) -> tuple[str, Iden
     ----------
     text
         ``"eeg"`` for the only candidate, ``"eeg=amplifier-1"`` for the one with that source id or
-        name, ``"eeg=none"`` to go on without.
+        name, ``"eeg=none"`` to record without it.
     streams
         How the study's streams are, as a recorder tells.
 
