@@ -1,6 +1,6 @@
 """The Methods paragraph of a paper, from the lock alone."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from labcrane.approval.lock import Lock
@@ -52,12 +52,13 @@ def _people(protocol: Mapping[str, Any]) -> list[str]:
 
 
 def _tasks(protocol: Mapping[str, Any], units: Mapping[str, str]) -> list[str]:
-    return [
-        f"Task {name} was {_use(task)} ({_listed(task, units)})"
-        if len(task) > 1
-        else f"Task {name} was {_use(task)}"
-        for name, task in protocol["tasks"].items()
-    ]
+    said = []
+    for name, task in protocol["tasks"].items():
+        words = name.replace("_", " ")
+        kind = "" if words == _use(task) else f" ({_use(task)})"
+        given = f"these settings: {_listed(task, units)}" if len(task) > 1 else "default settings"
+        said.append(f"The task {words}{kind} had {given}")
+    return said
 
 
 def _units(lock: Lock) -> dict[str, str]:
@@ -118,7 +119,7 @@ def _sessions(protocol: Mapping[str, Any]) -> list[str]:
         words = f"Session {number} ({session['name']})"
         if days := session.get("after_days"):
             words += f", {days[0]} to {days[1]} days after the one before,"
-        said.append(f"{words} consisted of {', '.join(map(_step, session['steps']))}")
+        said.append(f"{words} consisted of {_and(map(_step, session['steps']))}")
     return said
 
 
@@ -126,13 +127,18 @@ def _step(step: str | Mapping[str, Any]) -> str:
     if isinstance(step, str):
         return step
     ((kind, value),) = step.items()
+    if kind == "questionnaire":
+        names = [value] if isinstance(value, str) else value
+        return f"the questionnaire{'s' * (len(names) > 1)} {_and(names)}"
     if not isinstance(value, Mapping):
-        return f"{kind} ({value})"
+        return f"{kind} ({_value(value)})"
+    if kind == "break":
+        return f"a break of {_with_unit(value['seconds'], 's')}"
     name = value.get("name") or value.get("task")
     times = value.get("repeat", 1)
     if place := value.get("condition"):
         name = f"{name} (the participant's condition {place})"
-    label = f"{kind} {name}" if name else f"{kind} ({_listed(value)})"
+    label = f"the {kind} {name}" if name else f"{kind} ({_listed(value)})"
     return f"{times} times {label}" if times > 1 else label
 
 
@@ -147,19 +153,36 @@ def _listed(settings: Mapping[str, Any], units: Mapping[str, str] | None = None)
 
 def _setting(name: str, value: Any, units: Mapping[str, str]) -> str:
     """Return a setting in words; a unit at the end of its name goes behind the value."""
+    if name == "seconds":
+        return _with_unit(value, "s")
     words, _, ending = name.rpartition("_")
     unit = UNITS.get(ending, "")
     if not unit:
         words, unit = name, units.get(name, "")
+    return f"{words.replace('_', ' ')} {_with_unit(value, unit)}"
+
+
+def _with_unit(value: Any, unit: str) -> str:
+    """Return a value with its unit, unless it is written with its own, or is not a number."""
     numbers = value if isinstance(value, list) else [value]
-    if not all(type(number) in {int, float} for number in numbers):
-        unit = ""  # written with its own, or no number
-    return f"{words.replace('_', ' ')}: {_value(value)}{f' {unit}' if unit else ''}"
+    if not unit or not all(type(number) in {int, float} for number in numbers):
+        return _value(value)
+    return f"{_value(value)} {unit}"
+
+
+def _and(words: Iterable[str]) -> str:
+    """Return words as they are read aloud: ``a, b and c``."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _value(value: Any) -> str:
     if isinstance(value, list):
-        return " and ".join(map(_value, value)) if len(value) < 3 else ", ".join(map(_value, value))  # noqa: PLR2004 - a list of two is read aloud with "and"
+        return _and(map(_value, value)) if value else "none"
+    if isinstance(value, Mapping):
+        return ", ".join(
+            f"{str(name).replace('_', ' ')} {_value(of)}" for name, of in value.items()
+        )
     return _number(value) if isinstance(value, float) else str(value)
 
 

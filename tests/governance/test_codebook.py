@@ -7,7 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from governed import GROUPED, TODAY, Lab
+from governed import GOVERNED, GROUPED, TODAY, Lab
 from rehearsal import ScriptedConsole, a_study
 
 import labcrane
@@ -76,9 +76,10 @@ def test_the_methods_paragraph_says_what_was_approved_and_done(tmp_path: Path) -
         "3 groups (none, visual, sound) in permuted blocks of 3. ",  # of slots the register knows
         "CH8 knuckle boom",
         "at 240 Hz",
-        "aiming (distances: 2 and 3 m; movements: 1; limit: 20 s)",
+        "The task aiming had these settings: distances 2 and 3 m; movements 1; limit 20 s. ",
         "The levels of pairs came in randomised blocks, 3 times each, no more than 1 in a row",
-        "Session 1 (only), 0 to 3 days after the one before, consisted of consent, block aiming",
+        "Session 1 (only), 0 to 3 days after the one before, consisted of consent and the block "
+        "aiming. ",
         f"labcrane {labcrane.__version__}",
         lock.materials_sha256,
     ):
@@ -89,6 +90,21 @@ def test_the_methods_paragraph_says_what_was_approved_and_done(tmp_path: Path) -
     grant = Grant("Ethics board", "A1", lab.grant().valid_until, lock.consent)
     amended = methods(amend(lab.study, discover(), grant, "too easy", TODAY))
     assert f"and amended: A1 on {TODAY} (too easy)" in amended
+
+
+def test_the_steps_of_a_session_are_words_with_units_in_the_methods(tmp_path: Path) -> None:
+    asked = "questionnaires: {effort: {use: nasa_tlx}, ease: {use: nasa_tlx}}\nsessions:"
+    steps = (
+        "steps:\n      - questionnaire: [effort, ease]\n      - break: {seconds: 120}\n"
+        "      - questionnaire: effort"
+    )
+    text = GOVERNED.replace("sessions:", asked).replace("steps:", steps)
+    lab = Lab(tmp_path, text)
+    said = methods(lab.approve())
+    assert (
+        "consisted of the questionnaires effort and ease, a break of 120 s, the questionnaire "
+        "effort and the block aiming. "
+    ) in said
 
 
 def test_methods_writes_the_codebook_beside_the_protocol(
