@@ -60,7 +60,7 @@ def test_absolute_error_is_along_the_axis_and_radial_error_in_any_direction() ->
     )
     (row,) = errors(table).to_dict("records")
     assert row["constant_error_m"] == pytest.approx(0.15)
-    assert row["absolute_error_m"] == pytest.approx(0.2)
+    assert row["absolute_error_along_m"] == pytest.approx(0.2)
     assert row["radial_error_m"] == pytest.approx(0.35)
     assert row["variable_error_m"] == pytest.approx(np.sqrt((0.02 + 0.0) / 2.0))
 

@@ -326,8 +326,9 @@ def _movements(
     if outcomes.rests_apart(results):
         page.say(_rests(results))
     page.say(
-        "Constant, variable and absolute error are along the task axis, variable error within "
-        "conditions; radial error, the measure absolute_error, is the distance from the centre."
+        "Constant, variable and absolute error (absolute_error_along_m) are along the task axis, "
+        "variable error within conditions. Radial error (radial_error_m, of the measure "
+        "absolute_error) is the distance from the centre in any direction."
     )
     page.table("errors", errors(results))
     page.heading("Learning curves")

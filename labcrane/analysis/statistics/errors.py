@@ -14,12 +14,12 @@ CONDITION = ("session", "block", "distance", "far_side", "direction")
 def errors(results: "pd.DataFrame") -> "pd.DataFrame":
     """Return the errors of each participant, one row each, in m.
 
-    ``constant_error_m`` is the mean signed error along the task axis, and ``absolute_error_m`` the
-    mean of its size. ``variable_error_m`` is the spread of movements of one condition about
-    their mean along the axis (Schmidt & Lee 2011, Motor Control and Learning): the root
-    of the conditions' variances, averaged by their degrees of freedom; NaN where no condition has
-    two movements. ``radial_error_m`` is the mean distance from the target's centre, in any
-    direction, which is the measure ``absolute_error``.
+    ``constant_error_m`` is the mean signed error along the task axis, and
+    ``absolute_error_along_m`` the mean of its size. ``variable_error_m`` is the spread of
+    movements of one condition about their mean along the axis (Schmidt & Lee 2011, Motor Control
+    and Learning): the root of the conditions' variances, averaged by their degrees of freedom; NaN
+    where no condition has two movements. ``radial_error_m`` is the mean distance from the target's
+    centre, in any direction, which is the measure ``absolute_error``.
     """
     by_person = results.groupby("participant")
     condition = ["participant", *(name for name in CONDITION if name in results)]
@@ -34,6 +34,6 @@ def errors(results: "pd.DataFrame") -> "pd.DataFrame":
         constant_error_m=("constant_error", "mean"),
     )
     found["variable_error_m"] = np.sqrt(variance)
-    found["absolute_error_m"] = error.abs().groupby(results["participant"]).mean()
+    found["absolute_error_along_m"] = error.abs().groupby(results["participant"]).mean()
     found["radial_error_m"] = by_person["absolute_error"].mean()
     return found.reset_index()

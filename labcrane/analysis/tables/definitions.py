@@ -12,7 +12,8 @@ MEASURES: Mapping[str, tuple[str, str]] = {
     "absolute_error": (
         "m",
         "distance of the tip from the target's centre at the end, in any direction (radial error); "
-        "NaN where nothing moved",
+        "not absolute_error_along_m of the report, which is along the task axis only; NaN where "
+        "nothing moved",
     ),
     "measured_anew": (
         "1",
