@@ -78,7 +78,7 @@ ProtocolPath = Annotated[
     Path,
     typer.Argument(
         metavar="PROTOCOL",
-        help=f"the study's YAML file, or a folder with {PROTOCOL_FILE}",
+        help=STUDY,
         callback=protocol_in,
     ),
 ]
@@ -86,7 +86,7 @@ ProtocolHere = Annotated[
     Path,
     typer.Argument(
         metavar="PROTOCOL",
-        help=f"the study's YAML file, or a folder with {PROTOCOL_FILE}",
+        help=STUDY,
         callback=protocol_in,
         default_factory=Path,
         show_default="here",

@@ -25,6 +25,13 @@ def participant_path(folder: Path) -> Path:
     return folder / f"{folder.absolute().name}.h5"
 
 
+def nearby_file(path: Path) -> Path | None:
+    """Return the participant file that is meant by ``P001.h5`` where it is ``P001/P001.h5``."""
+    folders = (path.parent, path.parent / "data")
+    places = (participant_path(folder / path.stem) for folder in folders)
+    return next((place for place in places if place.name == path.name and place.is_file()), None)
+
+
 def part_path(path: Path, number: int) -> Path:
     """Return the path of a part, counted from 1, of the journal whose first part is ``path``."""
     return path if number == 1 else path.with_name(f"{path.stem}.part{number}.xdf")

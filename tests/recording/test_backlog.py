@@ -7,7 +7,7 @@ import pytest
 from recording.journals import frames, write
 from recording.test_kill import killed_writer
 
-from labcrane import open_recording
+from labcrane import RecordingError, open_recording
 from labcrane.errors import OutdatedRecordingWarning
 from labcrane.recording.participant_file.backlog import backlog
 from labcrane.recording.participant_file.recover import recover
@@ -46,6 +46,13 @@ def test_a_session_that_the_file_lacks_is_named_with_its_remedy(path: Path) -> N
     write(path.parent / "ses-02_run.xdf", 5)
     with pytest.warns(OutdatedRecordingWarning, match="session 2 is not in .*P001.h5, which is"):
         open_recording(path)
+
+
+def test_a_file_that_is_in_the_folder_of_its_name_is_named(path: Path) -> None:
+    with pytest.raises(RecordingError) as refused:
+        open_recording(path.parent.parent / "P001.h5")
+    wanted = path.parent.parent / "P001.h5"
+    assert str(refused.value) == f"there is no participant file {wanted}; did you mean {path}?"
 
 
 @pytest.mark.slow

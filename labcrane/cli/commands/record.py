@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from labcrane.cli.options import Local, data_in, protocol_in, stay_on_this_computer
+from labcrane.cli.options import (
+    STUDY,
+    Local,
+    data_here,
+    data_in,
+    protocol_in,
+    stay_on_this_computer,
+)
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError, RecordingError, nearest
 
@@ -192,13 +199,19 @@ def _flows(status: Mapping[str, Any]) -> bool:
 
 
 def recover(
-    folder: Annotated[
+    study: Annotated[
         Path,
-        typer.Argument(help="the study's data folder, or a folder in it", callback=data_in),
+        typer.Argument(
+            metavar="STUDY",
+            help=f"{STUDY}, or a folder in that",
+            callback=data_in,
+            default_factory=data_here,
+            show_default="here",
+        ),
     ],
 ) -> None:
     """Rebuild participant files from the journals a crash left."""
-    _recover(folder)
+    _recover(study)
 
 
 def _recover(folder: Path) -> None:

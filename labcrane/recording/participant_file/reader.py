@@ -21,6 +21,7 @@ from labcrane.recording.participant_file.columns import CHUNK, holds_texts, text
 from labcrane.recording.participant_file.session_group import SYNC_REPORT
 from labcrane.recording.participant_file.stream_group import BASES
 from labcrane.recording.participant_file.writer import group_name, held, reading
+from labcrane.recording.paths import nearby_file
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.types import FloatArray
 
@@ -458,6 +459,8 @@ def open_recording(path: Path | str) -> Recording:
     """
     path = Path(path)
     if not path.is_file():
+        if found := nearby_file(path):
+            raise RecordingError(f"there is no participant file {path}; did you mean {found}?")
         raise RecordingError(
             f"there is no participant file {path}; if there are journals, run labcrane recover "
             f"{path.parent} to build it"
