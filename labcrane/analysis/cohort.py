@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.files.yaml import parse_yaml
+from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.participant_file.backlog import backlog
 from labcrane.recording.participant_file.reader import Recording, SessionRecord
-from labcrane.recording.paths import participant_path
+from labcrane.recording.paths import nearby_file, participant_path
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -192,7 +193,11 @@ def everyone(folder: Path, struck: Mapping[str, Struck] | None = None) -> list[P
         There is no such folder.
     """
     if not folder.is_dir():
-        raise RecordingError(f"there is no data folder {folder}; give the study's data folder")
+        found = nearby_file(folder)
+        where = f", {found.parent.parent}, which holds {found}" if found else ""
+        raise RecordingError(
+            f"there is no data folder {folder}; give the study's data folder{where}"
+        )
     folders = [entry for entry in sorted(folder.iterdir()) if _is_participant(entry)]
     struck = struck or {}
     gone = [name for name in struck if not any(entry.name == name for entry in folders)]
@@ -224,7 +229,7 @@ def _nobody(folder: Path, left_out: Sequence[Participant]) -> str:
     found = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
     remedies = [f"{p.name}: {p.why}" for p in left_out if p.status is Status.UNREADABLE]
     if counts[str(Status.HALF_FINISHED)]:
-        remedies.append("labcrane resume continues an interrupted session")
+        remedies.append("labcrane resume --participant NAME continues an interrupted session")
     needed = {status for person in left_out for status in person.needs}
     asked = [f"--include {status}" for status in INCLUDABLE if status in needed]
     if asked:
@@ -244,11 +249,12 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
         return Participant(folder.name, path, *struck)
     if not path.exists():
         why = (
-            "its session is still running, or was killed: labcrane resume continues it, and "
-            f"labcrane recover {folder} builds the participant file from what was recorded"
+            "its session is still running, or was killed: labcrane resume "
+            f"{DataFolder.options(folder.name)} continues it, and labcrane recover {folder} builds "
+            "the participant file from what was recorded"
             if any(folder.glob("ses-*_run*.xdf"))
             else "its session did not start: only external streams are recorded; labcrane run "
-            "begins it"
+            f"{DataFolder.options(folder.name)} begins it"
         )
         return Participant(folder.name, path, Status.UNREADABLE, why)
     try:
@@ -260,7 +266,7 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
         hollow = [_hollow(number, recording.session(number)) for number in recording.sessions]
         if None not in hollow:
             return Participant(folder.name, path, Status.UNREADABLE, str(hollow[0]))
-        status, why, kind = _judge(recording)
+        status, why, kind = _judge(recording, folder.name)
     except (RecordingError, ProtocolError) as error:  # of the file, of the protocol in it
         return Participant(folder.name, path, Status.UNREADABLE, str(error))
     return Participant(folder.name, path, status, why, kind=kind)
@@ -282,11 +288,11 @@ def kinds_of(participants: Iterable[Participant]) -> str:
     return " and ".join(named)
 
 
-def _judge(recording: Recording) -> tuple[Status, str, Status | None]:
+def _judge(recording: Recording, name: str) -> tuple[Status, str, Status | None]:
     """Return the status, the reason for it, and the kind of the sessions."""
     sessions = {number: recording.session(number) for number in recording.sessions}
     kind, stamp = _kind(sessions)
-    why = _incomplete(sessions)
+    why = _incomplete(sessions, name)
     if why is not None:
         said = f"{why}; {stamp}" if stamp else why
         return Status.HALF_FINISHED, said, kind
@@ -304,13 +310,15 @@ def _kind(sessions: Mapping[int, SessionRecord]) -> tuple[Status | None, str]:
     return None, ""
 
 
-def _incomplete(sessions: Mapping[int, SessionRecord]) -> str | None:
+def _incomplete(sessions: Mapping[int, SessionRecord], name: str) -> str | None:
     """Return what is missing of a protocol's sessions, or None if all ran to their end."""
     for number, session in sessions.items():
         if (hollow := _hollow(number, session)) is not None:
             return f"{hollow}; the other sessions can be used"
         if (why := unfinished(session)) is not None:
-            return f"session {number} {why}"
+            which = f" --session {number}" if number > 1 else ""
+            again = f"labcrane resume {DataFolder.options(name)}{which}"
+            return f"session {number} {why}; to continue it, run {again}"
     _, last = max(sessions.items())
     return _progress(sessions) if len(sessions) < _planned(last.protocol) else None
 
@@ -330,7 +338,9 @@ def unfinished(session: SessionRecord) -> str | None:
     if last["name"] == "session.failed":
         return f"failed: {last['data'].get('why')}"
     reason = str(last["data"].get("reason"))
-    return None if reason == "complete" else f"ended {reason}"
+    if reason == "complete":
+        return None
+    return f"ended {reason}" if reason in {"by order", "incomplete"} else f"ended: {reason}"
 
 
 def _planned(protocol: str) -> int:

@@ -22,6 +22,7 @@ from labcrane.protocol.protocol import DEFAULT_OPERATOR, Protocol, read
 from labcrane.protocol.references import Parts, ReferenceChecker, twice
 from labcrane.protocol.steps import Block
 from labcrane.protocol.tracks import Track
+from labcrane.recording.data_folder import DataFolder
 from labcrane.registry.call_monitor import CallMonitor
 from labcrane.registry.registry import Registry
 
@@ -144,6 +145,11 @@ class Study:
         """Raise :class:`ProtocolError` unless ``participant`` matches the protocol's pattern."""
         pattern = self.protocol.participants.pattern
         if not re.fullmatch(pattern, participant):
+            if re.fullmatch(pattern, DataFolder.pseudonym(participant)):
+                raise ProtocolError(
+                    f"{participant!r} is the name of a folder with recordings; write "
+                    f"{DataFolder.options(participant)}"
+                )
             raise ProtocolError(
                 # As it stands in the file, where a backslash is one backslash.
                 f"participant {participant!r} does not match the protocol's pattern '{pattern}'; "

@@ -55,6 +55,17 @@ class DataFolder:
         """Return whether a ``name`` with suffixes is of data that a program made."""
         return name.endswith("-SIMULATED")
 
+    @staticmethod
+    def options(name: str) -> str:
+        """Return the options by which a command means the recordings of a ``name`` with suffixes.
+
+        ``P001-SIMULATED`` is ``--participant P001 --simulate``.
+        """
+        pseudonym = DataFolder.pseudonym(name)
+        pilot = " --pilot" * name.removesuffix("-SIMULATED").endswith("-PILOT")
+        simulate = " --simulate" * DataFolder.is_simulated(name)
+        return f"--participant {pseudonym}{pilot}{simulate}"
+
     @property
     def path(self) -> Path:
         """The participant's folder."""

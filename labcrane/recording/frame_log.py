@@ -13,6 +13,7 @@ from labcrane.core.records import Event, Frame, Phase, Run
 from labcrane.core.signals import Signal
 from labcrane.errors import RecordingError
 from labcrane.limits import LIMITS
+from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.journal import Column, SessionJournal
 from labcrane.types import FloatArray
 
@@ -206,7 +207,8 @@ class FrameLog:
     def _too_many(self) -> str:
         return (
             f"{len(self._waiting)} frames and events wait for the disk, and no more can: "
-            f"{self.trouble}; the session ends: repair the disk, then run labcrane resume"
+            f"{self.trouble}; the session ends: repair the disk, then run labcrane resume "
+            f"{DataFolder.options(self._journal.path.parent.name)}"
         )
 
     def _not_written(self, lost: int) -> str:

@@ -105,7 +105,7 @@ class Suspenders:
                 self._feedback_lost(report)
             case LauncherGone():
                 self._note("launcher.gone", {})
-                self.ending.append("the launcher is gone")
+                self.ending.append("labcrane run was closed or killed")
 
     def _feedback_lost(self, lost: FeedbackLost) -> None:
         who = f"feedback {lost.what}"

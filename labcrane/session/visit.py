@@ -154,6 +154,32 @@ def check_new(visit: Visit) -> None:
     )
 
 
+def check_begun(visit: Visit) -> None:
+    """Make sure that there is a session to be resumed.
+
+    Raises
+    ------
+    ProtocolError
+        It was not begun as it is to be resumed: as a pilot's, a simulation's or a person's.
+    """
+    if parts(visit.journal):
+        return
+    visit.study.check_participant(visit.participant)
+    others = [
+        replace(visit, pilot=pilot, simulated=simulated)
+        for simulated in (False, True)
+        for pilot in (False, True)
+    ]
+    if begun := [other for other in others if parts(other.journal)]:
+        listed = "; or ".join(
+            f"{other.folder.name} has one: run {other.resume_command}" for other in begun
+        )
+        raise ProtocolError(
+            f"{visit.folder.name} has no session {visit.session} to continue, but {listed}"
+        )
+    progress(visit.journal, ())  # which says that there is none
+
+
 def visit_of(protocol: Path, participant: str, session: int, data: Path, **options: Any) -> Visit:
     """Return a visit of the study in ``protocol``; ``options`` are the visit's other attributes.
 

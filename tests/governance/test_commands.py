@@ -221,6 +221,8 @@ def test_a_study_is_where_you_are_or_its_folder_its_protocol_or_its_data(
     monkeypatch.chdir(folder / here)
     assert "P001" in say(capsys, "participants", *words)
     assert "no deviations" in say(capsys, "deviations", *words)
+    if "--data" not in words:
+        assert "no journals below" in say(capsys, "recover", *words)
     if "--data" not in words:  # the commands of results take an argument only
         said = say(capsys, "report", *words, status=1)
         assert "there is no participant in" in said
@@ -249,7 +251,9 @@ def test_a_study_stands_before_a_participant_too(
     assert "P002 has consented" in say(capsys, "consent", study.name, "P002")
     say(capsys, "note", study.name, "P001", "left-handed")
     say(capsys, "exclude", f"{study.name}/data", "P001", "--reason", "dropped out")
-    assert "register" in say(capsys, "where", f"{study.name}/protocol.yaml", "P001")
+    places = say(capsys, "where", f"{study.name}/protocol.yaml", "P001")
+    assert "register" in places
+    assert say(capsys, "where", f"{study.name}/protocol.yaml", "P001-SIMULATED") == places
     said = say(capsys, "participants", study.name)
     assert "P001: left-handed" in said
     assert "dropped out" in said

@@ -86,11 +86,15 @@ def test_the_list_of_participants_says_which_session_is_owed(
     added.unlink()
     (lab.places.raw("P001") / "P001.h5").unlink()
     assert (
-        f"1 {TODAY} without participant file: still running, or was killed; labcrane resume"
+        f"1 {TODAY} without participant file: still running, or was killed; labcrane resume "
+        "--participant P001 continues it"
     ) in listed()
     for part in journal.parent.glob("*.xdf"):
         part.unlink()
-    assert f"1 {TODAY} did not start: nothing of it is recorded; labcrane run begins it" in listed()
+    assert (
+        f"1 {TODAY} did not start: nothing of it is recorded; labcrane run --participant P001 "
+        "begins it"
+    ) in listed()
 
 
 def test_a_session_whose_feedback_cannot_be_started_is_not_in_the_register(

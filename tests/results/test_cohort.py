@@ -25,7 +25,9 @@ def test_everybody_else_is_listed_with_a_reason(cohort: Cohort) -> None:
         "P006": "erased",
         "P007": "unreadable",
     }
-    assert listing.loc["P003", "why"] == "session 1 ended by order"
+    assert listing.loc["P003", "why"] == (
+        "session 1 ended by order; to continue it, run labcrane resume --participant P003"
+    )
     assert listing.loc["P001-PILOT", "why"] == "session 1 is stamped pilot"
     assert "labcrane recover" in listing.loc["P007", "why"]
     assert set(listing.loc[["P003", "P006"], "included"]) == {"no"}
@@ -52,6 +54,15 @@ def test_a_folder_without_anybody_to_use_says_what_is_in_it(tmp_path: Path) -> N
         find_cohort(tmp_path)
     with pytest.raises(RecordingError, match=r"there is no data folder .*; give the study's"):
         find_cohort(tmp_path / "nowhere")
+    (tmp_path / "P001").mkdir()
+    (tmp_path / "P001" / "P001.h5").touch()
+    with pytest.raises(RecordingError) as refused:
+        find_cohort(tmp_path / "P001.h5")
+    assert str(refused.value) == (
+        f"there is no data folder {tmp_path / 'P001.h5'}; give the study's data folder, "
+        f"{tmp_path}, which holds {tmp_path / 'P001' / 'P001.h5'}"
+    )
+    shutil.rmtree(tmp_path / "P001")
     erased = {"P001": (Status.ERASED, "on 2026-05-01: withdrew")}
     with pytest.raises(RecordingError, match=r"no usable participant in .*: 1 erased$"):
         find_cohort(tmp_path, struck=erased)
@@ -89,7 +100,8 @@ def test_a_file_given_as_data_folder_is_refused(
 def test_nobody_to_use_names_what_would_help(data: Path, tmp_path: Path) -> None:
     shutil.copytree(data / "P007", tmp_path / "P007")
     with pytest.raises(
-        RecordingError, match=r"resume continues it.*labcrane recover .*P007 builds"
+        RecordingError,
+        match=r"resume --participant P007 continues it.*labcrane recover .*P007 builds",
     ) as refused:
         find_cohort(tmp_path)
     assert "--include" not in str(refused.value)
@@ -136,7 +148,7 @@ def test_external_streams_alone_are_of_a_session_that_did_not_start(tmp_path: Pa
         find_cohort(tmp_path)
     assert str(refused.value).endswith(
         "P001: its session did not start: only external streams are recorded; labcrane run "
-        "begins it"
+        "--participant P001 begins it"
     )
 
 
@@ -168,7 +180,11 @@ def test_an_unfinished_pilot_or_simulation_needs_both_of_its_words(
     assert main(["report", str(tmp_path / "data"), "--include", kind]) == 1
     assert "no usable participant" in capsys.readouterr().err
     cohort = find_cohort(tmp_path / "data", [kind, "half-finished"])
-    assert cohort.included[0].why == f"session 1 ended by order; session 1 is stamped {kind}"
+    option = {"pilot": "--pilot", "simulated": "--simulate"}[kind]
+    assert cohort.included[0].why == (
+        "session 1 ended by order; to continue it, run labcrane resume --participant P001 "
+        f"{option}; session 1 is stamped {kind}"
+    )
     assert kinds_of(cohort.included) == kind.upper()
 
 

@@ -373,7 +373,7 @@ def test_export_writes_what_is_asked_for_and_who_was_left_out(
     out = tmp_path / "out"
     assert main(["export", str(data), "--to", to, "--out", str(out)]) == 3  # P007 is a wreck
     said = capsys.readouterr().out
-    assert "left out: P003, half-finished: session 1 ended by order" in said
+    assert "left out: P003, half-finished: session 1 ended by order; to continue it" in said
     assert "2/2" in said
     about = json.loads((out / ".labcrane" / "labcrane_export.json").read_text(encoding="utf-8"))
     assert about["format"] == to

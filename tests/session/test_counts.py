@@ -20,7 +20,7 @@ from labcrane.recording.participant_file.reader import open_recording
 from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.eligibility import EXEMPT
 from labcrane.session.session import outlook, run, still_owed
-from labcrane.session.visit import Visit, check_new
+from labcrane.session.visit import Visit, check_begun, check_new
 from labcrane.streams.context import situation_after
 from labcrane.web.state import SessionView
 from labcrane.web.viewer.film import Film
@@ -141,6 +141,27 @@ def test_a_session_that_stopped_is_named_with_its_resume_command(visit: Visit) -
         r"--participant P001 --session 1 --simulate$",
     ):
         check_new(visit)
+
+
+def test_a_resume_of_a_simulated_session_without_its_option_names_the_command(
+    visit: Visit,
+) -> None:
+    stopped(visit)
+    with pytest.raises(ProtocolError) as refused:
+        check_begun(replace(visit, simulated=False, resumed=True))
+    assert str(refused.value) == (
+        f"P001 has no session 1 to continue, but P001-SIMULATED has one: run {visit.resume_command}"
+    )
+    assert visit.resume_command.endswith(" --simulate")
+    check_begun(replace(visit, resumed=True))
+    with pytest.raises(ProtocolError, match=r"there is no journal .* start one with labcrane run"):
+        check_begun(replace(visit, session=2, resumed=True))
+    with pytest.raises(ProtocolError) as refused:
+        check_begun(replace(visit, participant="P001-SIMULATED", resumed=True))
+    assert str(refused.value) == (
+        "'P001-SIMULATED' is the name of a folder with recordings; write --participant P001 "
+        "--simulate"
+    )
 
 
 def test_data_elsewhere_and_a_pilot_are_in_the_resume_command(visit: Visit, tmp_path: Path) -> None:

@@ -24,9 +24,10 @@ def where(study: StudyFirst, participant: Someone, data: DataOrHere = None) -> N
     """List every place that holds a participant's data."""
     from labcrane.participants.folders import Places
     from labcrane.participants.inventory import inventory
+    from labcrane.recording.data_folder import DataFolder
 
     places = Places(one_study(data, data_in(first_study(study))))
-    found = inventory(places, participant)
+    found = inventory(places, DataFolder.pseudonym(participant))  # as the register names it
     if not found:
         out.print(f"{places.root} and its register contain no data of {participant}", markup=False)
         return

@@ -86,14 +86,17 @@ def _ended(places: "Places", participant: str, session: int) -> str:
             behind = backlog(path).get(session)
             return f"{ended}, as far as the file goes ({behind})" if behind else ended
         if not parts(journal_path(folder, session, "run")):
-            return "did not start: nothing of it is recorded; labcrane run begins it"
+            return (
+                "did not start: nothing of it is recorded; labcrane run --participant "
+                f"{participant} begins it"
+            )
         if recording is not None:
             return backlog(path)[session]
     except RecordingError as error:
         return f"cannot be read: {error}"
     return (
-        "without participant file: still running, or was killed; labcrane resume continues it, and "
-        f"labcrane recover {folder} builds the file"
+        "without participant file: still running, or was killed; labcrane resume --participant "
+        f"{participant} continues it, and labcrane recover {folder} builds the file"
     )
 
 
@@ -190,7 +193,7 @@ def deviations(study: StudyOrHere = None, data: DataOrHere = None) -> None:
     from labcrane.participants.folders import Places
 
     found = all_deviations(Places(one_study(data, study)))
-    table = whole_table("participant", "session", "trial", "what", "detail")
+    table = whole_table("participant", "session", "trial (in the tables)", "what", "detail")
     for name, deviation in found:
         where = [str(number) if number else "-" for number in (deviation.session, deviation.trial)]
         table.add_row(name, *where, deviation.what, deviation.detail)

@@ -179,11 +179,10 @@ def _demo_on(engine: str, folder: Path) -> Path:
 def _check(visit: "Visit") -> None:
     """Make sure that a session can be run, before anything of it is shown."""
     from labcrane.session.session import check_free
-    from labcrane.session.visit import check_new
+    from labcrane.session.visit import check_begun, check_new
 
     check_free(visit)
-    if not visit.resumed:
-        check_new(visit)
+    (check_begun if visit.resumed else check_new)(visit)
     visit.study.check_installed(simulated=visit.simulated, feedback=visit.feedback)
 
 
