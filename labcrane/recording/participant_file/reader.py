@@ -457,7 +457,20 @@ def open_recording(path: Path | str) -> Recording:
     RecordingError
         There is none at ``path``, or it cannot be read.
     """
-    path = Path(path)
+    recording = existing_recording(Path(path))
+    for said in backlog(recording.path).values():
+        warnings.warn(said, OutdatedRecordingWarning, stacklevel=2)
+    return recording
+
+
+def existing_recording(path: Path) -> Recording:
+    """Open a participant file, whatever the journals beside it hold.
+
+    Raises
+    ------
+    RecordingError
+        There is none at ``path``, or it cannot be read.
+    """
     if not path.is_file():
         if found := nearby_file(path):
             raise RecordingError(f"there is no participant file {path}; did you mean {found}?")
@@ -465,10 +478,7 @@ def open_recording(path: Path | str) -> Recording:
             f"there is no participant file {path}; if there are journals, run labcrane recover "
             f"{path.parent} to build it"
         )
-    recording = Recording(path)
-    for said in backlog(path).values():
-        warnings.warn(said, OutdatedRecordingWarning, stacklevel=2)
-    return recording
+    return Recording(path)
 
 
 @contextmanager

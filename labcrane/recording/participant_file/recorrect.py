@@ -9,7 +9,7 @@ import numpy as np
 
 from labcrane.recording.foreign_streams import OWN_CLOCK_CHANNELS, Note, RecordedStream
 from labcrane.recording.participant_file.columns import text_of, texts_of
-from labcrane.recording.participant_file.reader import open_recording
+from labcrane.recording.participant_file.reader import existing_recording
 from labcrane.recording.participant_file.stream_group import TIME_COLUMNS
 from labcrane.recording.participant_file.verification import bring_to_disk
 from labcrane.recording.participant_file.writer import Conclude, check_copied, opened, renewed
@@ -33,7 +33,7 @@ def recorrect(path: Path, conclude: Conclude) -> dict[int, list[str]]:
     """
     import h5py  # noqa: PLC0415 - loads for a second
 
-    open_recording(path)  # which says what to do when there is none
+    existing_recording(path)  # which says what to do when there is none
     done: dict[int, list[str]] = {}
     with renewed(path, f"labcrane resync {path}") as beside, opened(path) as old:
         with h5py.File(beside, "w") as new:
