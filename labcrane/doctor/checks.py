@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from labcrane.core.findings import Finding, Verdict
-from labcrane.doctor import apart, clock, components, disk, scheduling, screen
+from labcrane.doctor import apart, clock, components, disk, scheduling, screen, windows
 from labcrane.doctor.report import Check, Diagnosis, as_data, diagnosis, keep, latest
 from labcrane.doctor.versions import versions
 from labcrane.protocol.study import Study
@@ -53,6 +53,9 @@ def examine(
         ("disk", apart.Call(f"folder {data}", UNMOUNTED, disk.examine, (data, needed_bytes))),
     ):
         yield from _checks(area, apart.examine(call))
+    if windows.APPLIES:
+        settings = apart.Call("settings of Windows", OTHERWISE, windows.examine, (data,))
+        yield from _checks("windows", apart.examine(settings))
     if study:
         yield from _checks("scheme", directions(study))
     looks = components.of_study(study, registry) if study else components.of_everything(registry)[0]
