@@ -1,0 +1,75 @@
+"""README and docs stay short: words, pages, and sentences have limits."""
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from docs.page import ROOT
+
+
+def load() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("count_words", ROOT / "docs" / "count.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+count = load()
+
+LATER = {"people.md", "compatibility.md"}
+"""Pages with six sentences that are still too long."""
+
+
+def test_the_readme_and_the_changelog_are_short() -> None:
+    assert count.words(ROOT / "README.md") <= count.LONGEST_README == 700
+    assert count.changelog_lines() <= count.LONGEST_CHANGELOG == 250
+
+
+def test_only_pages_of_the_reference_are_longer_than_1500_words() -> None:
+    assert count.long_pages() == []
+    assert any(count.words(page) > count.LONGEST_PAGE for page in count.pages())
+
+
+@pytest.mark.parametrize("page", count.pages(), ids=lambda page: str(page.relative_to(ROOT)))
+def test_no_sentence_has_more_than_35_words(page: Path) -> None:
+    if page.name not in LATER:
+        assert count.long_sentences(page.read_text(encoding="utf-8")) == []
+
+
+LONG = " ".join(["Word", *["word"] * 35]) + "."
+
+
+@pytest.mark.parametrize(
+    "text",
+    [LONG, f"Short. {LONG} Short.", f"# Title\n\n* {LONG}\n* Short.", LONG.replace(" ", "\n")],
+)
+def test_a_sentence_of_36_words_is_found(text: str) -> None:
+    assert count.long_sentences(text) == [LONG]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Two words. " * 36,
+        f"```sh\n{LONG}\n```",
+        f"| {LONG} |",
+        f"# {LONG}",
+        f"It says:\n\n    {LONG}\n",
+        f"<!-- first: {LONG} -->",
+        f"Run `{LONG}` or [this]({LONG.replace(' ', '-')}).",
+    ],
+)
+def test_tables_code_and_headings_are_not_sentences(text: str) -> None:
+    assert count.long_sentences(text) == []
+
+
+def test_the_report_names_each_long_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(count, "pages", lambda: [ROOT / "README.md"])
+    monkeypatch.setattr(count, "LONGEST_SENTENCE", 5)
+    said = count.report()
+    assert f"README.md: {count.words(ROOT / 'README.md')} words\n" in said
+    assert "\nsentences over 5 words: " in said
+    assert "\n  README.md: " in said
