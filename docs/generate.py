@@ -51,8 +51,9 @@ def protocol_page() -> str:
     lines = [
         "# Every key of a protocol",
         "",
-        "`labcrane check` says which key is wrong, in which line, and what is possible. Keys of a "
-        "component beside `use:` are on the page of its role.",
+        "For authors of protocols. The tables list every key with its type, default and meaning; "
+        "keys of a component beside `use:` are on the page of its role. `labcrane check` names "
+        "each wrong key with its line and what is possible.",
         "",
         *keys(schema),
     ]
@@ -171,7 +172,13 @@ def plugin_pages() -> Iterator[tuple[str, str]]:
     for role, entry in ROLES.items():
         if not (offers := registry.offers[role]):
             continue
-        lines = [f"# {entry.word.capitalize()}: what is installed", "", plain(role.__doc__ or "")]
+        lines = [
+            f"# {entry.word.capitalize()}: what is installed",
+            "",
+            READERS,
+            "",
+            plain(role.__doc__ or ""),
+        ]
         for name, offer in sorted(offers.items()):
             plugin = registry.plugins[role][name]
             component = build(offer, *used.get(name, (None, machine)))
@@ -179,6 +186,12 @@ def plugin_pages() -> Iterator[tuple[str, str]]:
             lines += settings_of(offer.settings)
             lines += recorded(component)
         yield entry.word, "\n".join([*lines, ""])
+
+
+READERS = (
+    "For authors of protocols and plugins. The tables list every component of this role that comes "
+    "with labcrane: its settings, and what it records."
+)
 
 
 def used_settings(registry: Registry) -> dict[str, tuple[Settings, Machine]]:
@@ -314,7 +327,8 @@ def decisions_page() -> str:
     lines = [
         "# Decisions",
         "",
-        "Choices that took an argument: what was decided, why, and what was rejected.",
+        "For everyone who changes labcrane, or asks why it is as it is. Each page states what was "
+        "decided, why, and what was rejected.",
         "A number that the code cites is that of a page, or one of those in brackets.",
     ]
     for topic, links in found.items():

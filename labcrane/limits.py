@@ -1,8 +1,8 @@
 """Limits of everything that enters from outside: one table, and the checks that keep to it.
 
 Limits are enforced in the sender's process, before the input reaches a pipe or the loop. The time
-of every check grows at most linearly with its input. docs/security.md prints the table; a test
-compares the two.
+of every check grows at most linearly with its input. docs/reference/input-limits.md prints the
+table; a test compares the two.
 """
 
 import json

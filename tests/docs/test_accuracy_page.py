@@ -7,7 +7,9 @@ import pytest
 from streams.strangers import ALL
 from streams.unkind_score import score, table_line
 
-PAGE = (Path(__file__).parents[2] / "docs" / "accuracy.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "reference" / "accuracy.md").read_text(
+    encoding="utf-8"
+)
 LINES = re.findall(r"^\| .+ % \| .+ of \d+ \|$", PAGE, re.MULTILINE)
 DRAWS = int(re.search(r"--draws (\d+) --page", PAGE)[1])
 

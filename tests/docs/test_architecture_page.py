@@ -10,7 +10,8 @@ import pytest
 from docs.page import ROOT
 
 PAGE = (ROOT / "docs" / "architecture.md").read_text()
-WAYS = dict(re.findall(r"^### (.*?)\n(.*?)(?=^#|\Z)", PAGE, re.M | re.S))
+PATHS = (ROOT / "docs" / "data-paths.md").read_text()
+WAYS = dict(re.findall(r"^## (.*?)\n(.*?)(?=^#|\Z)", PATHS, re.M | re.S))
 STEP = re.compile(r"^(\d+)\. `([\w.]+)`: (.*)$", re.M)
 IMPORTED, IMPORTS = re.compile(r"\(imported by (\d+)\)"), re.compile(r"\(imports (\d+)\)")
 BOTH = re.compile(r"\(both know `([^`]+)`: (\d+)\)")

@@ -1,4 +1,4 @@
-"""docs/security.md says what the module of limits says."""
+"""docs/reference/input-limits.md says what the module of limits says."""
 
 import re
 from importlib import import_module
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from labcrane.limits import LIMITS, Limit
 
-PAGE = Path(__file__).parents[2] / "docs" / "security.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "input-limits.md"
 
 
 def row(name: str, limit: Limit) -> str:

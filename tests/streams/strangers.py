@@ -157,4 +157,4 @@ STRANGERS: dict[str, Callable] = {
 }
 
 ALL = {**ROWS, **STRANGERS, **MORE}
-"""All kinds; in the order of the table in docs/accuracy.md."""
+"""All kinds; in the order of the table in docs/reference/accuracy.md."""

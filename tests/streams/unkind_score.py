@@ -136,7 +136,7 @@ def shortcomings(one: Score) -> list[str]:
 
 
 def table_line(found: list[Score]) -> str:
-    """Return a row's line of the table in docs/accuracy.md. Milliseconds."""
+    """Return a row's line of the table in docs/reference/accuracy.md. Milliseconds."""
     error = np.mean([one.p95 for one in found])
     usual = np.mean([one.usual for one in found])
     return (
