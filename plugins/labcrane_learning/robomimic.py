@@ -34,8 +34,8 @@ class Robomimic(Exporter):
 
     Pictures of the cameras that are asked for are ``obs/CAMERA_image``, of the modality ``rgb``.
 
-    Beside what robomimic reads, each demonstration states whose it is, its task in words, whether it
-    succeeded, and the operator's skill. ``presentation_failed`` states whether the operator was
+    Beside what robomimic reads, each demonstration states whose it is, its task in words, whether
+    it succeeded, and the operator's skill. ``presentation_failed`` states whether the operator was
     shown too little, which is not a success. ``mask/success`` lists those that succeeded; names and
     units of columns are attributes.
     """

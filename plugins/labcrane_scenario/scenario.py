@@ -24,9 +24,9 @@ class Scenario(Task):
     """One run in a scene is one trial: its goals in their order, and the mistakes during the run.
 
     ``target`` is the goal of the moment, ``target.jaws`` how far the jaws must be open for it (-1
-    when it does not matter). ``target.touch`` is 1 when its thing was touched, 0 when it is still to
-    be touched, -1 where nothing is. ``goals.reached`` is how many are done, ``deformity.distance``
-    how far the tip is from the deformed limb (-1 where there is none).
+    when it does not matter). ``target.touch`` is 1 when its thing was touched, 0 when it is still
+    to be touched, -1 where nothing is. ``goals.reached`` is how many are done,
+    ``deformity.distance`` how far the tip is from the deformed limb (-1 where there is none).
     """
 
     signals = (
