@@ -174,7 +174,7 @@ class ComponentResolver:
                 sounds[name] = choice
         views = self.choose_several(Feedback, "views")
         for name in views.keys() & {*cues, *sounds}:
-            self._source.problem(("views", name), f"{name!r} is the name of a feedback already")
+            self._source.problem(("views", name), f"{name!r} is already the name of a feedback")
         return cues, sounds, views
 
     def _is_cue(self, name: object) -> bool:

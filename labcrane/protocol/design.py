@@ -67,7 +67,7 @@ class LevelOrder(Settings):
     def _something_is_random(cls, in_a_row: int | None, info: ValidationInfo) -> int | None:
         rule = info.data.get("rule")
         if in_a_row is not None and rule is not None and rule not in LIMITED:
-            raise ValueError(f"the rule is {rule!r}, where nothing is random; drop in_a_row")
+            raise ValueError(f"the rule {rule!r} has no random order; remove in_a_row")
         return in_a_row
 
     def why_not(self, levels: int) -> str:

@@ -110,7 +110,7 @@ class PageSettings(Settings):
         if (ratio := contrast_to_white(colour)) < READABLE:
             raise ValueError(
                 f"white words on {colour} have a contrast of {ratio:.1f} to 1, and need "
-                f"{READABLE:g} to be read; take a darker colour"
+                f"at least {READABLE:g} to 1; choose a darker colour"
             )
         return colour
 

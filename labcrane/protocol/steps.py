@@ -224,7 +224,7 @@ def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
     block = source.check(Block, (*place, kind))
     if block and block.until and kind != "practice":
         source.problem(
-            (*place, kind, "until"), "only practice has a criterion; drop until", key=True
+            (*place, kind, "until"), "only practice can have a criterion; remove until", key=True
         )
         return None
     if block and block.track and (wrong := _beside_track(block)):

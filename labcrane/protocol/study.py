@@ -227,7 +227,7 @@ class Checker:
             self._source.problem(
                 ("participants", "pattern"),
                 f"participants.pattern '{self._protocol.participants.pattern}' matches no name; "
-                "^ fits the beginning of a name only and $ its end, and neither is needed",
+                "remove ^ and $, which match only the beginning and the end of a name",
             )
 
     def _check_names(self) -> None:

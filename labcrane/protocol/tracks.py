@@ -143,8 +143,8 @@ class Track(Settings):
         same = [name for name, number in levels.items() if numbers.count(number) > 1]
         if same and not was_run(info):
             raise ValueError(
-                f"levels {' and '.join(map(repr, same))} are as hard as each other; leave all but "
-                "one out, or give them numbers of their own"
+                f"levels {' and '.join(map(repr, same))} are equally hard; remove all but one, "
+                "or give each a different number"
             )
         return levels
 
@@ -161,8 +161,8 @@ class Track(Settings):
         beforehand = spacing * math.sqrt((THRESHOLDS**2 - 1) / 12)
         if law.until_sd >= beforehand * (1.0 - ROUNDING):
             raise WrongKey(
-                f"{law.until_sd:g} is reached before the first answer, as the standard deviation "
-                f"of the threshold is {beforehand:.3g} then; write less",
+                f"{law.until_sd:g} is reached before the first answer, when the standard "
+                f"deviation of the threshold is {beforehand:.3g}; write a smaller value",
                 at=("until_sd",),
             )
         return law

@@ -328,7 +328,7 @@ def _check_names(
         if name not in numbers:
             source.problem(
                 (*place, name),
-                f"{name!r} is not a numeric setting of {study.operator.name!r}; there is "
+                f"{name!r} is not a numeric setting of {study.operator.name!r}; choose one of "
                 f"{', '.join(numbers)}",
                 key=True,
             )

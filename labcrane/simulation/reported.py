@@ -199,8 +199,8 @@ def _check(planned: PlannedTest) -> None:
         )
     if kind != "contrast" and effect.between:
         raise ProtocolError(
-            f"two levels, [{','.join(effect.between)}], are compared by --test contrast, or t; "
-            f"{kind} is over all of them: write {effect.measure}~{effect.factor}"
+            f"--test {kind} tests all levels, and [{','.join(effect.between)}] are two; write "
+            f"{effect.measure}~{effect.factor}, or --test contrast to compare the two"
         )
     if kind == "trend" and (effect.factor != SEQUENCE or len(planned.factors.phases) > 1):
         raise ProtocolError(

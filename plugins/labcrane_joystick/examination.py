@@ -78,7 +78,7 @@ def _examined(
     if ask is None:
         yield Finding(
             Verdict.WARN,
-            "range, direction and rate of the sticks were not looked at: nobody moves them",
+            "range, direction and rate of the sticks were not checked: no stick was moved",
             "run labcrane doctor --move and follow what it says",
         )
         return

@@ -71,8 +71,8 @@ class _Book:
             if rate_hz != self.rate_hz or rate_hz != int(rate_hz):
                 raise RecordingError(
                     f"{participant.name} has {rate_hz:g} rows a second; a data set of LeRobot has "
-                    f"one whole number of frames a second for all, here {self.rate_hz:g}; every= "
-                    "says every how many ticks there is one"
+                    f"one whole number of frames a second for all, here {self.rate_hz:g}; set "
+                    "every= to the number of ticks from one frame to the next"
                 )
 
     def add(

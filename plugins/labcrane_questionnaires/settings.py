@@ -377,7 +377,7 @@ class FreeSettings(Settings):
             )
         if twice := sorted({*found} & {*given}):
             raise WrongKey(
-                f"{', '.join(twice)} is said in {given['file']!r} and in the protocol; keep one",
+                f"{', '.join(twice)} is in both {given['file']!r} and the protocol; remove one",
                 at=(twice[0],),
             )
         return {**found, **given, "file": None}

@@ -33,7 +33,7 @@ def check_goals(name: str, scene: Scene, state: Layout) -> None:
     for goal in scene.goals:
         if goal.what not in known:
             raise ProtocolError(
-                f"scene {name!r}: a goal is about {goal.what!r}, whose position is not in the "
+                f"scene {name!r}: a goal names {goal.what!r}, whose position is not in the "
                 f"machine's state; the state has positions of {', '.join(said) or 'nothing'}"
             )
         if goal.touch is not None and goal.touch not in (felt := _of_things(state, "force")):

@@ -87,7 +87,7 @@ def test_a_track_that_ends_before_it_begins_is_refused_and_any_other_is_planned(
         (one,) = said
         assert one.startswith(f"{line_of(text, 'until_sd')}:19: ")
         assert "is reached before the first answer" in one
-        assert f"is {prior.sd:.3g} then; write less" in one
+        assert f"is {prior.sd:.3g}; write a smaller value" in one
 
 
 def test_whatever_a_rehearsal_raises_is_a_finding_with_its_block(

@@ -191,7 +191,11 @@ def test_the_study_of_these_mistakes_is_fine_without_them(tmp_path: Path) -> Non
         ("track: reach", "track: raech", r":17:.*no track 'raech'; did you mean 'reach'"),
         ("factor: pairs", "factor: pear", r":14:.*does not vary 'pear'; .*pairs"),
         ("1m_far_left: 1", "1m_far_lift: 1", r":15:.*pairs has no level '1m_far_lift'; did you"),
-        ("1m_far_left: 1", "1m_far_left: 2", "levels '1m_far_left' and '2m_far_left' are as hard"),
+        (
+            "1m_far_left: 1",
+            "1m_far_left: 2",
+            "levels '1m_far_left' and '2m_far_left' are equally hard",
+        ),
         ("up_down: {}", "carry: true", "neither is there; one of up_down and quest_plus"),
         ("up_down: {}", "up_down: {}\n      quest_plus: {spreads: [1]}", "both are there; one of"),
         (

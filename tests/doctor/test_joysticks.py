@@ -107,7 +107,7 @@ def test_without_a_person_the_rest_position_is_looked_at(table: Desk) -> None:
     assert "left x rests at +0.0 % of its range" in said(found, Verdict.PASS)
     warned = said(found, Verdict.WARN)
     assert "not identified" in warned[0]
-    assert warned[-1].endswith("were not looked at: nobody moves them")
+    assert warned[-1].endswith("were not checked: no stick was moved")
     assert not said(found, Verdict.FAIL)
 
 

@@ -114,7 +114,7 @@ def test_what_was_switched_on_is_in_the_trial_table(tmp_path: Path) -> None:
         (FED.replace("sphere", "spere"), "cue 'spere' is not installed; did you mean 'sphere'?"),
         (FED.replace("sonification", "sonifcation"), "did you mean 'sonification'?"),
         (FED.replace("far: 3.0", "fat: 3.0"), "did you mean 'far'"),
-        (FED + "views: {ball: {use: view}}\n", "'ball' is the name of a feedback already"),
+        (FED + "views: {ball: {use: view}}\n", "'ball' is already the name of a feedback"),
         (
             FED + "views: {v: {use: view, camera: moon}}\n",
             "there is no such camera as 'moon'; there is",

@@ -227,7 +227,7 @@ def test_a_simulated_participants_slot_is_its_number(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("order", "said"),
     [
-        ("{rule: williams, in_a_row: 2}", "the rule is 'williams', where nothing is random; drop"),
+        ("{rule: williams, in_a_row: 2}", "the rule 'williams' has no random order; remove"),
         ("{rule: random}", "'random' is not a rule; use one of as_written, blocked, latin_square"),
         ("{rule: shuffled, times: 0}", r"times is 0; it must be greater than 0"),
     ],

@@ -59,7 +59,7 @@ def test_consent_is_a_step_of_the_record(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("- practice: {", "- block: {", "only practice has a criterion; drop until"),
+        ("- practice: {", "- block: {", "only practice can have a criterion; remove until"),
         ("- consent", "- consent: P001", "consent is a step by itself; write '- consent'"),
         ("successes: 3", "successes: 0", "must be greater than 0"),
         ("steps:\n", "after_days: [3, 1]\n    steps:\n", "earliest day, 3, is after the latest"),

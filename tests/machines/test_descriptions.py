@@ -219,7 +219,7 @@ def test_all_kinematics_agree_where_the_boom_stands_before_the_slew_axis() -> No
     [
         ('<axis xyz="0 0 1"/>', '<axis xyz="0 1 0"/>', "'joint1' comes first and must slew"),
         ('0.024 0 0.128"/><axis xyz="0 1 0"/>', '0.024 0 0.128"/><axis xyz="0 0 1"/>',
-         "joint 'joint3' must pitch about a level axis, as all but the first"),
+         "joint 'joint3' must pitch about a horizontal axis, like all joints but the first"),
         ('0.124 0 0"/><axis xyz="0 1 0"/>', '0.124 0 0"/><axis xyz="1 0 0"/>',
          "the axes of 'joint2' and 'joint4' are not parallel"),
         ('<origin xyz="0.126 0 0"/>', '<origin xyz="0.126 0.02 0"/>',
@@ -495,7 +495,7 @@ def test_the_rounding_of_a_file_is_taken_and_said(tmp_path: Path) -> None:
     ("old", "new", "said"),
     [
         ('0.024 0 0.128"/><axis xyz="0 1 0"/>', '0.024 0 0.128"/><axis xyz="0 1 0.01"/>',
-         "joint 'joint3' must pitch about a level axis"),
+         "joint 'joint3' must pitch about a horizontal axis"),
         ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>', "'joint1' has the axis 0 0 0"),
         ("<link name", '<xacro:arm xmlns:xacro="http://wiki.ros.org/xacro"/><link name',
          "it is xacro, not yet URDF"),

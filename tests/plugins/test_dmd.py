@@ -263,7 +263,7 @@ WRONG = {
     ),
     "percent": (
         lambda t: t.assign(signal=t.signal * 0.4),
-        r"signals go to 100; a model needs recordings up to 250",
+        r"the largest signal is 100; a model needs recordings up to 250",
     ),
     "one direction": (
         lambda t: t[t.groupby("run").signal.transform("min") >= 0],

@@ -166,7 +166,7 @@ def test_impossible_scenes_are_refused_in_words(tmp_path: Path) -> None:
         pass
     inside = BLOCK.replace("[1.6, 1.2, 0.1001]", "[1.6, 0.1, 0.1001]")
     with (
-        pytest.raises(ProtocolError, match=r"'ball' stands 0.\d+ m deep in 'block' at the start"),
+        pytest.raises(ProtocolError, match=r"'ball' overlaps 'block' by 0.\d+ m at the start"),
         standing(inside, tmp_path),
     ):
         pass

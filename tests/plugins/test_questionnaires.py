@@ -246,7 +246,7 @@ def test_the_labs_own_questions_may_stand_in_a_file_of_their_own(tmp_path: Path)
     study = a_study(tmp_path, a_protocol(ASK_COMFORT, BY_FILE))
     assert [item.text for item in study.questionnaires["comfort"].items()] == ["Too hot?"]
     twice = BY_FILE.replace("comfort.yaml", "comfort.yaml, title: Warmth")
-    assert "title is said in 'comfort.yaml' and in" in refusal(tmp_path, ASK_COMFORT, twice)
+    assert "title is in both 'comfort.yaml' and" in refusal(tmp_path, ASK_COMFORT, twice)
     file.write_text("Too hot?", encoding="utf-8")
     assert "holds no keys; it must hold title and questions" in refusal(
         tmp_path, ASK_COMFORT, BY_FILE

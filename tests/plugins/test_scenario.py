@@ -186,7 +186,7 @@ def test_a_goal_of_which_the_state_says_nothing_is_refused_before_the_session(
     (tmp_path / "lying.yaml").write_text(text.replace("goals:\n", f"goals:\n{goal}"), "utf-8")
     task = Scenario(ScenarioSettings(scenes=(tmp_path / "lying.yaml",)), ch8())
     run = make_run(ch8(), state=crane_state(ch8()).signals, task=task.signals)
-    said = r"scene 'lying': a goal is about 'figure.pelvis', whose position is not in the machine's"
+    said = r"scene 'lying': a goal names 'figure.pelvis', whose position is not in the machine's"
     with pytest.raises(ProtocolError, match=said):
         task.open(run)
 

@@ -75,7 +75,7 @@ def test_capitals_are_as_high_on_the_retina_as_they_are_to_be(
 def test_the_size_of_text_needs_the_screens_and_the_eyes_distance() -> None:
     with pytest.raises(ValidationError, match="text_arcmin needs viewing_m, the distance from the"):
         ViewSettings(text_arcmin=22)
-    said = "^a picture without a screen does not say how wide it is; measure the visible picture"
+    said = "^a picture without a screen does not report its width; measure the visible picture"
     with (
         pytest.raises(DeviceError, match=said),
         a_view(renderer="software", text_arcmin=22, viewing_m=0.7),

@@ -430,13 +430,13 @@ def test_cohorts_are_the_same_whoever_makes_them() -> None:
             "anova",
             "movement_time~group[none,visual]",
             NOTHING,
-            "compared by --test contrast, or t; a",
+            "--test anova tests all levels, and [none,visual] are two; write",
         ),
         (
             "trend",
             "movement_time~sequence[1,2]",
             NOTHING,
-            "two levels, [1,2], are compared by --test",
+            "--test trend tests all levels, and [1,2] are two; write",
         ),
         (
             "contrast",

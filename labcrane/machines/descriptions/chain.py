@@ -199,7 +199,8 @@ def _plane(slew: Axis, chain: Sequence[Axis], tip: FloatArray) -> tuple[FloatArr
     for each in chain:
         if abs(each.direction[2]) > ROUNDED:
             raise ChainError(
-                f"joint {each.name!r} must pitch about a level axis, as all but the first"
+                f"joint {each.name!r} must pitch about a horizontal axis, like all joints but "
+                "the first"
             )
         if np.linalg.norm(np.cross(each.direction, across)) > 2.0 * ROUNDED:
             raise ChainError(

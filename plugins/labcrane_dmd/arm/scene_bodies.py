@@ -180,7 +180,7 @@ def check_apart(standing: list[StandingBody], arm: int, client: int) -> None:
             deep = -min((point[DISTANCE] for point in near), default=0.0)
             if deep > OVERLAP_M:
                 raise ProtocolError(
-                    f"{other!r} stands {deep:.3f} m deep in {one!r} at the start of the trial; "
+                    f"{other!r} overlaps {one!r} by {deep:.3f} m at the start of the trial; "
                     "move it, or scatter it less"
                 )
 

@@ -90,8 +90,8 @@ def drive(
     named = {recording.name: recording for recording in recordings}
     if missing := [name for name in model if name not in named]:
         raise RecordingError(
-            f"there is no recording of {', '.join(missing)}, which the model has; there is "
-            f"{', '.join(named)}"
+            f"there is no recording of {', '.join(missing)}, which the model has; there are "
+            f"recordings of {', '.join(named)}"
         )
     bench = _Bench(DmdArm(settings, machine, model), machine, rate_hz)
     try:

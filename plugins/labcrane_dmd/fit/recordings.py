@@ -174,6 +174,6 @@ def _check_whole(path: Path, runs: tuple[JointRun, ...]) -> None:
         )
     if max(abs(run.signal) for run in runs) < FULL:
         raise RecordingError(
-            f"{path}: signals go to {max(abs(run.signal) for run in runs):g}; a model needs "
-            "recordings up to 250, which is full flow in both directions"
+            f"{path}: the largest signal is {max(abs(run.signal) for run in runs):g}; a model "
+            "needs recordings up to 250, which is full flow in both directions"
         )

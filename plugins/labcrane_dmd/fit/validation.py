@@ -72,8 +72,8 @@ def validate(model: Model, recordings: Sequence[SegmentRecording]) -> tuple[Leve
     named = {recording.name: recording for recording in recordings}
     if missing := [name for name in model if name not in named]:
         raise RecordingError(
-            f"there is no recording of {', '.join(missing)}, which the model has; there is "
-            f"{', '.join(named)}"
+            f"there is no recording of {', '.join(missing)}, which the model has; there are "
+            f"recordings of {', '.join(named)}"
         )
     return tuple(level for name in model for level in _levels(model, model[name], named[name]))
 

@@ -138,7 +138,7 @@ def per_metre(settings: ViewSettings, monitor: Monitor | None) -> float:
     if monitor is None or monitor.wide_mm <= 0:
         who = "a picture without a screen" if monitor is None else f"monitor {monitor.name}"
         raise DeviceError(
-            f"{who} does not say how wide it is; measure the visible picture and write screen_mm"
+            f"{who} does not report its width; measure the visible picture and write screen_mm"
         )
     return monitor.size[0] / monitor.wide_mm * MM_PER_M
 
