@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.files.yaml import parse_yaml
 from labcrane.recording.data_folder import DataFolder
-from labcrane.recording.participant_file.backlog import backlog
 from labcrane.recording.participant_file.reader import Recording, SessionRecord
+from labcrane.recording.participant_file.recover import backlog
 from labcrane.recording.paths import nearby_file, participant_path
 
 if TYPE_CHECKING:

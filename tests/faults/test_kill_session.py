@@ -23,8 +23,7 @@ from faults.sessions import (
 
 from labcrane import open_recording
 from labcrane.errors import OutdatedRecordingWarning
-from labcrane.recording.participant_file.backlog import backlog
-from labcrane.recording.participant_file.recover import recover
+from labcrane.recording.participant_file.recover import backlog, recover
 from labcrane.recording.xdf.reader import read_xdf
 from labcrane.session.postprocess import conclude
 from labcrane.session.resume import progress

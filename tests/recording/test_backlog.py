@@ -9,8 +9,7 @@ from recording.test_kill import killed_writer
 
 from labcrane import RecordingError, open_recording
 from labcrane.errors import OutdatedRecordingWarning
-from labcrane.recording.participant_file.backlog import backlog
-from labcrane.recording.participant_file.recover import recover
+from labcrane.recording.participant_file.recover import backlog, recover
 from labcrane.recording.participant_file.writer import consolidate
 from labcrane.recording.paths import next_part
 

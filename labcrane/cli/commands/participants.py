@@ -73,8 +73,8 @@ def _ended(places: "Places", participant: str, session: int) -> str:
     """Return how a session ended, as its participant file has it now."""
     from labcrane.analysis.cohort import unfinished
     from labcrane.errors import RecordingError
-    from labcrane.recording.participant_file.backlog import backlog
     from labcrane.recording.participant_file.reader import Recording
+    from labcrane.recording.participant_file.recover import backlog
     from labcrane.recording.paths import journal_path, participant_path, parts
 
     folder = places.raw(participant)

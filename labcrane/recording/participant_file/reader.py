@@ -16,8 +16,8 @@ import numpy.typing as npt
 from labcrane.errors import OutdatedRecordingWarning, RecordingError
 from labcrane.recording.annotations import COLUMNS, read_annotations
 from labcrane.recording.journal import GROUPS
-from labcrane.recording.participant_file.backlog import backlog
 from labcrane.recording.participant_file.columns import CHUNK, holds_texts, text_of, texts_of
+from labcrane.recording.participant_file.recover import backlog
 from labcrane.recording.participant_file.session_group import SYNC_REPORT
 from labcrane.recording.participant_file.stream_group import BASES
 from labcrane.recording.participant_file.writer import group_name, held, reading

@@ -8,9 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from labcrane.errors import RecordingError
-from labcrane.recording.participant_file.backlog import backlog
 from labcrane.recording.participant_file.reader import Recording, SessionRecord, open_recording
-from labcrane.recording.participant_file.recover import recover
+from labcrane.recording.participant_file.recover import backlog, recover
 from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.recording.paths import participant_path
 from labcrane.session.postprocess import conclude
