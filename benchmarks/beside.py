@@ -161,7 +161,7 @@ def sound(folder: Path, length: float) -> Row:
 
 def main() -> None:
     """Measure everything, and print it for people or for the calling process."""
-    sys.path.insert(0, str(TESTS))
+    sys.path[:0] = [str(TESTS), str(TESTS / "helpers")]
     with tempfile.TemporaryDirectory(prefix="labcrane-beside-") as name:
         folder = Path(name)
         config = folder / "lsl_api.cfg"

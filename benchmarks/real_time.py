@@ -113,7 +113,7 @@ def session(folder: Path, name: str, seconds: float, words: tuple[str, ...]) -> 
 
 def main() -> None:
     """Measure everything, and print it for people or for the calling process."""
-    sys.path.insert(0, str(TESTS))
+    sys.path[:0] = [str(TESTS), str(TESTS / "helpers")]
     numbers = [float(word) for word in sys.argv[1:] if word != "--json"]
     with tempfile.TemporaryDirectory(prefix="labcrane-real-time-") as name:
         folder = Path(name)

@@ -32,7 +32,8 @@ from labcrane.streams.network import LOOPBACK
 if TYPE_CHECKING:
     from streams.unkind_score import Score
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+TESTS = Path(__file__).parents[1] / "tests"
+sys.path[:0] = [str(TESTS), str(TESTS / "helpers")]
 
 EXACT, CHUNK = "exact", "chunk"
 LEAST_S, MEAN_S = 0.008, 0.012

@@ -65,7 +65,7 @@ def rows(*, brief: bool = False) -> list[Row]:
 
 def rows_of(minutes: float) -> list[Row]:
     """Return the same of a session so long."""
-    sys.path.insert(0, str(TESTS))
+    sys.path[:0] = [str(TESTS), str(TESTS / "helpers")]
     from pages.room import a_browser  # noqa: PLC0415
 
     with tempfile.TemporaryDirectory() as name:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from needs import needs
+from own_modules import OWN_MODULES
 
 from labcrane.streams.network import LOOPBACK
 from labcrane.streams.search import PORTS
@@ -32,7 +33,7 @@ def begun(folder: Path, times: int) -> list[dict]:
         capture_output=True,
         text=True,
         check=True,
-        env={**os.environ, "LSLAPICFG": str(config), "PYTHONPATH": str(HERE.parent)},
+        env={**os.environ, "LSLAPICFG": str(config), "PYTHONPATH": OWN_MODULES},
     )
     return [json.loads(line) for line in done.stdout.splitlines()]
 

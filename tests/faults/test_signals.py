@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from faults.sessions import STUDY, labcrane, unique, wait_for
 from faults.test_streams import Conversation
+from own_modules import OWN_MODULES
 
 from labcrane import open_recording
 
@@ -30,7 +31,7 @@ class Head:
             [sys.executable, program, source],
             stdin=subprocess.PIPE,
             text=True,
-            env={**os.environ, "PYTHONPATH": str(TESTS)},
+            env={**os.environ, "PYTHONPATH": OWN_MODULES},
         )
 
     def make(self, what: str, column: int) -> None:

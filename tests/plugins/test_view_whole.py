@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from own_modules import OWN_MODULES
 from PIL import ImageGrab
 from plugins.whole_picture import counted
 from windows import a_view, an_x_server, make_frame
@@ -28,10 +29,9 @@ SIZE = (480, 320)
 def moving(display: str, renderer: str, name: str, *bare: str) -> Iterator[dict[str, int]]:
     """Open a window in which the crane turns; give what its whole pictures hold at least."""
     program = Path(__file__).with_name("moving_window.py")
-    tests = str(Path(__file__).parents[1])
     process = subprocess.Popen(
         [sys.executable, str(program), renderer, name, f"{name} - whole", *bare],
-        env={**os.environ, "DISPLAY": display, "PYTHONPATH": tests},
+        env={**os.environ, "DISPLAY": display, "PYTHONPATH": OWN_MODULES},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from needs import UNSHARE, needs
+from own_modules import OWN_MODULES
 
 needs_mounts = needs("mounts")
 
@@ -51,7 +52,7 @@ def in_namespace(mount: str, script: str, folder: Path) -> subprocess.CompletedP
         capture_output=True,
         encoding="utf-8",
         check=False,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
+        env={**os.environ, "PYTHONPATH": OWN_MODULES},
     )
 
 

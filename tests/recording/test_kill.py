@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyxdf
+from own_modules import OWN_MODULES
 from recording import journals
 from recording.journals import frames, stamp, write
 
@@ -20,7 +21,7 @@ from labcrane.recording.participant_file.writer import consolidate
 from labcrane.recording.paths import next_part
 from labcrane.recording.xdf.reader import read_xdf
 
-ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+ENVIRONMENT = {**os.environ, "PYTHONPATH": OWN_MODULES}
 
 
 def killed_writer(path: Path, after_s: float, pause: float) -> list[int]:

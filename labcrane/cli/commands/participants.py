@@ -188,12 +188,12 @@ def waive(
 
 
 def deviations(study: StudyOrHere = None, data: DataOrHere = None) -> None:
-    """List protocol deviations."""
+    """List protocol deviations, with trials by their numbers in the trial table."""
     from labcrane.participants.deviations import all_deviations
     from labcrane.participants.folders import Places
 
     found = all_deviations(Places(one_study(data, study)))
-    table = whole_table("participant", "session", "trial (in the tables)", "what", "detail")
+    table = whole_table("participant", "session", "trial", "what", "detail")
     for name, deviation in found:
         where = [str(number) if number else "-" for number in (deviation.session, deviation.trial)]
         table.add_row(name, *where, deviation.what, deviation.detail)

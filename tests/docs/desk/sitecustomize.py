@@ -10,7 +10,7 @@ import sys
 import threading
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).parents[2]))
+sys.path.append(str(Path(__file__).parents[2] / "helpers"))
 
 from labcrane_joystick import sdl
 
