@@ -120,7 +120,7 @@ class Cleaner:
     folders
         Folders whose names are replaced wherever they are: of the study and of the data.
     patterns
-        Regular expressions of pseudonyms; what fits one is replaced, whoever it is.
+        Regular expressions of pseudonyms; every text that fits one is replaced.
     """
 
     def __init__(

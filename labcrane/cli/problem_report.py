@@ -383,7 +383,7 @@ def _about(
         },
         "doctor_at_start": _checks(at_start, clean),
         "journals": [
-            # The name of a journal is the program's, but for a file that somebody renamed.
+            # The name of a journal is the program's, but for a file that was renamed.
             asdict(each) | {"name": each.name if session_of(Path(each.name)) else "(a path)"}
             for each in states
         ],

@@ -79,7 +79,10 @@ def test_a_rehearsal_names_the_first_participant_whose_things_stand_in_each_othe
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 2, said
     for line, (name, trial) in zip(said, expected.values(), strict=True):
-        assert f"rehearsal, session 'only', trial {trial} of {name}: 'two' stands 0." in line
+        assert (
+            f"rehearsal, session 'only', trial {trial} of {name}: 'two' overlaps 'one' by 0."
+            in line
+        )
         assert line.endswith("move it, or scatter it less")
 
 
