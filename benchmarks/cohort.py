@@ -84,7 +84,7 @@ def one_core(folder: Path, participants: int) -> list[Row]:
         for passes in PASSES:
             bare[passes] += bare_s(study, passes, count // PART) * count / (count // PART)
     whole = {200: 0.6, 400: 0.6}
-    made = f"{participants} participants, {stepping.ticks} ticks by twins, us per tick"
+    made = f"{participants} participants, {stepping.ticks} ticks by kernels, us per tick"
     return [
         *(
             Row(
@@ -109,7 +109,7 @@ def one_core(folder: Path, participants: int) -> list[Row]:
 
 
 class Stepping:
-    """What twins take for their ticks, with everything that is handed over."""
+    """What kernels take for their ticks, with everything that is handed over."""
 
     def __init__(self) -> None:
         self.seconds, self.ticks = 0.0, 0

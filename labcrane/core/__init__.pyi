@@ -1,11 +1,12 @@
 """The public names of this package, and the modules from which they are imported."""
 
-from . import compiled, twin
+from . import compiled, kernel
 from .cranes.crane import Crane
 from .cranes.crane_settings import CraneSettings, GrappleSettings, LoadedCraneSettings
 from .cranes.hanging import LoadedCrane
 from .findings import Finding, Verdict
 from .items import AnswerError, Answers, Item, Score, numeric_answers
+from .kernel import Kernel, Places
 from .primitives import Cylinder, Shape, Sphere, TargetFinder
 from .records import (
     CameraImage,
@@ -49,7 +50,6 @@ from .settings import (
     was_run,
 )
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
-from .twin import Places, Twin
 
 __all__ = [
     "AnswerError",
@@ -71,6 +71,7 @@ __all__ = [
     "InputAxis",
     "Item",
     "JointName",
+    "Kernel",
     "Layout",
     "LinkName",
     "LoadedCrane",
@@ -95,7 +96,6 @@ __all__ = [
     "StudyPath",
     "TargetFinder",
     "TrialStatus",
-    "Twin",
     "Unit",
     "Usual",
     "Value",
@@ -104,12 +104,12 @@ __all__ = [
     "Within",
     "WrongKey",
     "compiled",
+    "kernel",
     "numeric_answers",
     "outside",
     "read_csv_text",
     "read_settings",
     "read_yaml",
     "signals_of",
-    "twin",
     "was_run",
 ]

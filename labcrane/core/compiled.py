@@ -1,7 +1,7 @@
 """Compiler of kernels: numba, with the one calling convention of each role.
 
 Numba is an extra and loads for a second: it is loaded when the first function is compiled, so
-import a module with compiled functions in :meth:`labcrane.Component.twin` and nowhere else.
+import a module with compiled functions in :meth:`labcrane.Component.kernel` and nowhere else.
 Arithmetic is Python's, operation by operation: nothing is reordered or fused, and a root, a sine or
 a cube root is the C library's, as Python's is. ``math.hypot`` and ``math.dist`` are not: Python
 3.12 rounds differently from 3.11. Write the root of a sum of squares, here and in the component.

@@ -24,6 +24,7 @@ from pydantic import BaseModel
 if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
     from labcrane.core.clock import Tick
     from labcrane.core.items import Answers, Item, Score
+    from labcrane.core.kernel import Kernel
     from labcrane.core.primitives import Shape, Sphere
     from labcrane.core.records import (
         CameraImage,
@@ -37,7 +38,6 @@ if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
         Value,
     )
     from labcrane.core.signals import Signal, SignalFault, SignalStream
-    from labcrane.core.twin import Twin
     from labcrane.machines.machine import Body
     from labcrane.types import FloatArray
 
@@ -61,10 +61,10 @@ class Component(ABC):
         """Return facts of the open component for the record: calibration, versions."""
         return {}
 
-    def twin(self) -> Twin | None:
+    def kernel(self) -> Kernel | None:
         """Return the compiled kernel of the open component's tick, for simulations; None for none.
 
-        For an input device, a controller, a machine or a task: see :mod:`labcrane.core.twin`.
+        For an input device, a controller, a machine or a task: see :mod:`labcrane.core.kernel`.
         Called once per session, and only if numba is installed, so import numba here.
         """
         return None

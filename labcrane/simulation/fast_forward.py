@@ -11,9 +11,9 @@ from importlib.util import find_spec
 
 import numpy as np
 
+from labcrane.core.kernel import Kernel
 from labcrane.core.records import Frame, Phase, Run
 from labcrane.core.roles import Component, Task
-from labcrane.core.twin import Twin
 from labcrane.protocol.rig import Rig
 from labcrane.recording.frame_log import CODES, LOOP, BatchLog, FrameRow, sizes
 from labcrane.session.sequencer import Sequencer
@@ -74,14 +74,14 @@ class FastForward:
         self._places = np.cumsum([len(LOOP), *sizes(run)]).astype(np.int64)
         self._seen = np.empty(self._rows.size)
         self._about = np.empty(5)
-        self._twins: tuple[Twin, ...] = ()
-        self._tasks: Mapping[Task, Twin] = {}
+        self._kernels: tuple[Kernel, ...] = ()
+        self._tasks: Mapping[Task, Kernel] = {}
         self.way = self._find(rig)
 
     def _find(self, rig: Rig) -> SimulatedBy:
         if find_spec("numba") is None:
             return SimulatedBy(compiled=False, why=f"numba is not installed; {EXTRA} brings it")
-        from labcrane.simulation.kernel import addresses, advance, same_arithmetic  # noqa: PLC0415
+        from labcrane.simulation.compiled_loop import addresses, advance, same_arithmetic  # noqa: PLC0415
 
         if not same_arithmetic():
             return SimulatedBy(
@@ -91,23 +91,25 @@ class FastForward:
             "operator": rig.input, "scheme": rig.controller, "dynamics": rig.dynamics,
             **{f"task {name!r}": task for name, task in rig.tasks.items()},
         }  # fmt: skip
-        twins = {name: part.twin() for name, part in parts.items()}
-        found = {name: twin for name, twin in twins.items() if twin is not None}
-        if missing := [name for name in twins if name not in found]:
+        kernels = {name: part.kernel() for name, part in parts.items()}
+        found = {name: kernel for name, kernel in kernels.items() if kernel is not None}
+        if missing := [name for name in kernels if name not in found]:
             return SimulatedBy(compiled=False, why=f"{', '.join(missing)} has no compiled kernel")
         self._advance = advance
         operator, scheme, dynamics, *tasks = found.values()
-        self._twins = (operator, scheme, dynamics)
+        self._kernels = (operator, scheme, dynamics)
         self._tasks = dict(zip(rig.tasks.values(), tasks, strict=True))
         self._functions = {
-            task: addresses(operator.tick, scheme.inverse, scheme.tick, dynamics.tick, twin.tick)
-            for task, twin in self._tasks.items()
+            task: addresses(operator.tick, scheme.inverse, scheme.tick, dynamics.tick, kernel.tick)
+            for task, kernel in self._tasks.items()
         }
-        most = sum(twin.changing for twin in found.values())
+        most = sum(kernel.changing for kernel in found.values())
         self._kept = np.empty(most)
         compiler = f"numba {version('numba')}"
         return SimulatedBy(
-            compiled=True, why=compiler, deviation=max(twin.deviation for twin in found.values())
+            compiled=True,
+            why=compiler,
+            deviation=max(kernel.deviation for kernel in found.values()),
         )
 
     def __call__(self, frame: Frame, start: float) -> Frame:
@@ -116,19 +118,19 @@ class FastForward:
         Returns the frame of the last, or ``frame`` when there is none.
         """
         going = self._sequencer.going
-        if going is None or not self._twins or self._waiting():
+        if going is None or not self._kernels or self._waiting():
             return frame
-        twins = (*self._twins, self._tasks[going.task])
-        if not all(twin.take_over(twin.own, frame) for twin in twins):
+        kernels = (*self._kernels, self._tasks[going.task])
+        if not all(kernel.take_over(kernel.own, frame) for kernel in kernels):
             return frame
         number = frame.tick.number + 1
-        hands, scheme, machine, task = twins
+        hands, scheme, machine, task = kernels
         read, inverse, command, step, evaluate = self._functions[going.task]
         self._rows.fill(self._seen, frame)
         self._about[:] = (
             start, self._run.rate_hz, frame.trial, going.ticks, CODES[Phase.RUNNING],
         )  # fmt: skip
-        changing = np.array([twin.changing for twin in twins], np.int64)
+        changing = np.array([kernel.changing for kernel in kernels], np.int64)
         last, seen, done = None, self._seen, 0
         while True:
             room = self._log.room
@@ -138,8 +140,8 @@ class FastForward:
                 step, machine.own, evaluate, task.own, changing,
             )  # fmt: skip
             if made:
-                for twin in twins:
-                    twin.hand_back(twin.own, room[:made], self._places)
+                for kernel in kernels:
+                    kernel.hand_back(kernel.own, room[:made], self._places)
                 seen = last = room[made - 1].copy()
                 done += made
                 self._about[3] += made

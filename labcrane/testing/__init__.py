@@ -13,6 +13,7 @@ from labcrane.testing.commands import CommandContract
 from labcrane.testing.components import PluginContract, check_closes_after_failed_open, check_soon
 from labcrane.testing.examinations import ExaminationContract
 from labcrane.testing.exporters import PARTICIPANT_TRIALS, ExporterContract, make_participant
+from labcrane.testing.kernels import KernelContract
 from labcrane.testing.monitors import SignalMonitorContract
 from labcrane.testing.presentation import TARGETS, CueContract, FeedbackContract, make_target
 from labcrane.testing.questionnaires import QuestionnaireContract
@@ -34,7 +35,6 @@ from labcrane.testing.roles import (
 )
 from labcrane.testing.tasks import TaskContract
 from labcrane.testing.triggers import TriggerContract
-from labcrane.testing.twins import TwinContract
 
 __all__ = [
     "PARTICIPANT_TRIALS",
@@ -49,12 +49,12 @@ __all__ = [
     "ExporterContract",
     "FeedbackContract",
     "InputContract",
+    "KernelContract",
     "PluginContract",
     "QuestionnaireContract",
     "SignalMonitorContract",
     "TaskContract",
     "TriggerContract",
-    "TwinContract",
     "ch8",
     "check_array",
     "check_closes_after_failed_open",

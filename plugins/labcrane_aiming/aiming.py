@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from labcrane import Frame, Machine, ProtocolError, Run, Signal, Task, Trial
-from labcrane.core import Event, Phase, PlannedTrial, TrialStatus, Twin, twin
+from labcrane.core import Event, Kernel, Phase, PlannedTrial, TrialStatus, kernel
 from labcrane.machines import reach
 from labcrane_aiming.pairs import Pair, Point, index_of_difficulty, pairs
 from labcrane_aiming.settings import AimingSettings
@@ -20,7 +20,7 @@ PLAN_INTERCEPT_S = 1.0
 PLAN_SLOPE_S = 3.2
 
 PRESSED = 0.5  # a button is 0 or 1
-END_RULES = ("rest_inside", "rest_anywhere", "trigger")  # by their numbers in the compiled twin
+END_RULES = ("rest_inside", "rest_anywhere", "trigger")  # by their numbers in the compiled kernel
 RUNNING = Phase.RUNNING  # Python 3.11 takes long to find it there in every tick; 3.12 does not
 
 
@@ -225,13 +225,13 @@ class Aiming(Task):
             events.append(Event("movement.offset", movement.due[end]))
         return TrialStatus(phase, self._values, tuple(events), movement.measures(end))
 
-    def twin(self) -> Twin:
+    def kernel(self) -> Kernel:
         import numpy as np  # noqa: PLC0415 - as in open
 
         from labcrane_aiming.compiled import CHANGING, SHOWN, evaluate  # noqa: PLC0415 - loads numba
 
         own = np.zeros(SHOWN + 7)
-        return Twin(evaluate, own, CHANGING, self._take_over, self._hand_back)
+        return Kernel(evaluate, own, CHANGING, self._take_over, self._hand_back)
 
     def _take_over(self, own: "FloatArray", seen: Frame) -> bool:
         from labcrane_aiming.compiled import SHOWN  # noqa: PLC0415 - loads numba
@@ -254,10 +254,10 @@ class Aiming(Task):
         return True
 
     def _hand_back(self, own: "FloatArray", rows: "FloatArray", places: "Places") -> None:
-        movement, at = self._movement, int(places[twin.STATE])
+        movement, at = self._movement, int(places[kernel.STATE])
         tip, velocity = self._tip, self._velocity
         movement.go_on(
-            rows[:, twin.ELAPSED], rows[:, twin.TIME], rows[:, at + tip.start : at + tip.stop],
+            rows[:, kernel.ELAPSED], rows[:, kernel.TIME], rows[:, at + tip.start : at + tip.stop],
             rows[:, at + velocity.start : at + velocity.stop],
         )  # fmt: skip
         movement.rest_since, inside, entries, pressed, movement.fast_since, off = own[:6].tolist()

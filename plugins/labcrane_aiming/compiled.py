@@ -3,7 +3,7 @@
 import math
 
 from labcrane import FloatArray
-from labcrane.core import Places, compiled, twin
+from labcrane.core import Places, compiled, kernel
 
 RESTS_SINCE, INSIDE, ENTRIES, PRESSED, FAST_SINCE, HANDS_OFF = range(6)
 CHANGING = 6
@@ -45,9 +45,9 @@ def _begins(own: FloatArray, elapsed: float, speed: float, distance: float) -> b
 @compiled.tick
 def evaluate(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> int:
     """Judge a tick; decline one with an event, or that may end the trial."""
-    state, task, rule = places[twin.STATE], places[twin.TASK], own[RULE]
+    state, task, rule = places[kernel.STATE], places[kernel.TASK], own[RULE]
     tip, velocity = state + int(own[TIP]), state + int(own[VELOCITY])
-    elapsed = row[twin.ELAPSED]
+    elapsed = row[kernel.ELAPSED]
     vx, vy, vz = row[velocity], row[velocity + 1], row[velocity + 2]
     speed = math.sqrt(vx * vx + vy * vy + vz * vz)
     ex = row[tip] - own[SHOWN]
@@ -62,32 +62,32 @@ def evaluate(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray)
     elif math.isnan(own[RESTS_SINCE]):
         own[RESTS_SINCE] = elapsed
     if own[BEGUN] == 0.0 and _begins(own, elapsed, speed, distance):
-        return twin.DECLINED
+        return kernel.DECLINED
     if own[REACTED] == 0.0:
         given = False
         for k in range(
-            places[twin.COMMAND] + int(own[FIRST]), places[twin.COMMAND] + int(own[LAST])
+            places[kernel.COMMAND] + int(own[FIRST]), places[kernel.COMMAND] + int(own[LAST])
         ):
             given = given or row[k] != 0.0
         if given and (own[COMMANDED] == 0.0 or own[HANDS_OFF] != 0.0):
-            return twin.DECLINED
+            return kernel.DECLINED
         if not given:
             own[HANDS_OFF] = 1.0
     if entered:
         own[ENTRIES] += 1.0
         if own[ENTRIES] == 1.0:
-            return twin.DECLINED
+            return kernel.DECLINED
     if rule == BY_TRIGGER:
-        pressed = row[places[twin.AXES] + int(own[TRIGGER])] > 0.5  # noqa: PLR2004 - as in the class
+        pressed = row[places[kernel.AXES] + int(own[TRIGGER])] > 0.5  # noqa: PLR2004 - as in the class
         if pressed and own[PRESSED] == 0.0:
-            return twin.DECLINED
+            return kernel.DECLINED
         own[PRESSED] = 1.0 if pressed else 0.0
     elif elapsed - own[RESTS_SINCE] >= own[REST] and (
         rule == REST_INSIDE
         or ((inside or own[BEGUN] != 0.0) and _done(own, row, tip) >= own[AFTER] - ROUNDING)
     ):
-        return twin.DECLINED
+        return kernel.DECLINED
     if elapsed >= own[LIMIT]:
-        return twin.DECLINED
-    row[task : places[twin.END]] = own[SHOWN : SHOWN + places[twin.END] - task]
-    return twin.MADE
+        return kernel.DECLINED
+    row[task : places[kernel.END]] = own[SHOWN : SHOWN + places[kernel.END] - task]
+    return kernel.MADE

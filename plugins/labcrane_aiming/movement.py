@@ -95,7 +95,7 @@ class AimedMovement:
             self._look_for_onset(elapsed, speed, distance)
 
     def _look_for_onset(self, elapsed: float, speed: float, distance: float) -> None:
-        """Take one tick more into account; the compiled twin does the same.
+        """Take one tick more into account; the compiled kernel does the same.
 
         The onset is the first tick of the first stretch in which the tip is faster than the onset
         speed for long enough, however fast it becomes later. What was fast already when the trial

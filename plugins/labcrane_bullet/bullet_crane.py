@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from labcrane import FloatArray, Machine, PluginError, Run
-from labcrane.core import Crane, CraneSettings, Twin, Value
+from labcrane.core import Crane, CraneSettings, Kernel, Value
 from labcrane.machines import GRAVITY, urdf_of
 from labcrane_bullet.engine import pybullet
 
@@ -70,8 +70,8 @@ class BulletCrane(Crane):
     def metadata(self) -> Mapping[str, Value]:
         return {**super().metadata(), "engine": f"pybullet {version('pybullet')}"}
 
-    def twin(self) -> Twin | None:
-        return self.engine_twin()
+    def kernel(self) -> Kernel | None:
+        return self.engine_kernel()
 
     def _motion(self) -> tuple[Sequence[float], Sequence[float]]:
         return self._angles, self._speeds

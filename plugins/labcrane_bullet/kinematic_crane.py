@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from labcrane import FloatArray
-from labcrane.core import Crane, Twin
+from labcrane.core import Crane, Kernel
 
 
 class KinematicCrane(Crane):
@@ -12,8 +12,8 @@ class KinematicCrane(Crane):
     Speeds are integrated exactly. A joint that reaches its limit stops there, with speed zero.
     """
 
-    def twin(self) -> Twin:
-        return self.law_twin()
+    def kernel(self) -> Kernel:
+        return self.law_kernel()
 
     def _stand(self, angles: Sequence[float], speeds: Sequence[float]) -> None:
         self._angles = list(angles)

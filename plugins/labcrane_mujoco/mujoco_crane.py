@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from labcrane import FloatArray, Machine, Run
-from labcrane.core import Crane, CraneSettings, Twin, Value
+from labcrane.core import Crane, CraneSettings, Kernel, Value
 from labcrane.machines import GRAVITY, urdf_of
 from labcrane_mujoco.limited_drives import limited_torques
 
@@ -63,8 +63,8 @@ class MujocoCrane(Crane):
     def metadata(self) -> Mapping[str, Value]:
         return {**super().metadata(), "engine": f"mujoco {version('mujoco')}"}
 
-    def twin(self) -> Twin | None:
-        return self.engine_twin()
+    def kernel(self) -> Kernel | None:
+        return self.engine_kernel()
 
     def _motion(self) -> tuple[Sequence[float], Sequence[float]]:
         return self._angles, self._speeds

@@ -104,7 +104,7 @@ class Aimer:
         return target == self._target
 
     def numbers(self) -> list[float]:
-        """Return what a compiled twin goes on from; :mod:`.compiled` says what is where."""
+        """Return what a compiled kernel goes on from; :mod:`.compiled` says what is where."""
         values, drawn = self._noise.drawn()
         now = (self._doing.value, self._time, self._wait, self._press, *values, len(drawn))
         plan = self._plan
@@ -127,7 +127,7 @@ class Aimer:
         )  # fmt: skip
 
     def go_on(self, numbers: Sequence[float]) -> None:
-        """Go on from where a compiled twin came to."""
+        """Go on from where a compiled kernel came to."""
         doing, self._time, self._wait, self._press, x, y, z, left = numbers
         self._doing = Doing(int(doing))
         self._noise.go_on((x, y, z), int(left))

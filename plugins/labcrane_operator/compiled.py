@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 
 from labcrane import FloatArray
-from labcrane.core import Places, compiled, twin
+from labcrane.core import Places, compiled, kernel
 
 # What changes from tick to tick, in the order in which Aimer.numbers puts it.
 DOING, TIME, WAIT, PRESS, NOISE, LEFT = 0, 1, 2, 3, 4, 7
@@ -29,7 +29,7 @@ def hands(
     theirs: FloatArray,
 ) -> int:  # fmt: skip
     """Make the axes of a tick; decline to plan, and to draw noise."""
-    state, task = places[twin.STATE], places[twin.TASK]
+    state, task = places[kernel.STATE], places[kernel.TASK]
     tip, velocity = state + int(own[TIP]), state + int(own[VELOCITY])
     x, y, z = seen[tip], seen[tip + 1], seen[tip + 2]
     moving = True
@@ -42,20 +42,20 @@ def hands(
         if own[DOING] == HOLDING:
             own[PRESS] -= own[DT]
             if not inside:
-                return twin.DECLINED
+                return kernel.DECLINED
             moving = False
         elif own[DOING] == REACTING:
             if own[WAIT] <= 0.0:
-                return twin.DECLINED
+                return kernel.DECLINED
             moving = False
         elif own[DOING] == LOOKING and own[WAIT] <= 0.0:
             if not inside:
-                return twin.DECLINED
+                return kernel.DECLINED
             vx, vy, vz = seen[velocity], seen[velocity + 1], seen[velocity + 2]
             if math.sqrt(vx * vx + vy * vy + vz * vz) < own[STILL]:
                 own[DOING] = HOLDING
                 moving = False
-    axes = row[places[twin.AXES] : places[twin.COMMAND]]
+    axes = row[places[kernel.AXES] : places[kernel.COMMAND]]
     axes[:] = 0.0
     if moving and own[PLANNED] != 0.0:
         vx = vy = vz = 0.0
@@ -84,7 +84,7 @@ def hands(
         vx, vy, vz = pace * vx + gain * ex, pace * vy + gain * ey, pace * vz + gain * ez
         if not (vx * vx + vy * vy + vz * vz < own[STILL2] and own[DOING] == LOOKING):
             if own[LEFT] < 1.0:
-                return twin.DECLINED
+                return kernel.DECLINED
             own[LEFT] -= 1.0
             drawn, sd = DRAWN + 3 * int(own[LEFT]), own[MOTOR]
             for k in range(3):
@@ -92,10 +92,10 @@ def hands(
             own[ASKED] = vx * (1.0 + sd * own[NOISE])
             own[ASKED + 1] = vy * (1.0 + sd * own[NOISE + 1])
             own[ASKED + 2] = vz * (1.0 + sd * own[NOISE + 2])
-            if inverse(theirs, places, own[ASKED : ASKED + 3], seen, row) != twin.MADE:
-                return twin.DECLINED
+            if inverse(theirs, places, own[ASKED : ASKED + 3], seen, row) != kernel.MADE:
+                return kernel.DECLINED
     axes[int(own[LEFT_ON])] = 1.0
     axes[int(own[RIGHT_ON])] = 1.0
     if own[DOING] == HOLDING and own[PRESS] > 0.0:
         axes[int(own[TRIGGER])] = 1.0
-    return twin.MADE
+    return kernel.MADE

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from labcrane import FloatArray, Frame, InputDevice, Run, Signal, Tick, Trial
-from labcrane.core import Layout, Phase, Places, Twin, Value
+from labcrane.core import Kernel, Layout, Phase, Places, Value
 from labcrane_operator.aimer import STILL, Aimer
 from labcrane_operator.noise import BLOCK, Noise
 from labcrane_operator.settings import CONNECTED, STICK, OperatorSettings
@@ -93,7 +93,7 @@ class SimulatedOperator(InputDevice):
     def metadata(self) -> Mapping[str, Value]:
         return {"simulated": True, "pace": self._pace}
 
-    def twin(self) -> Twin | None:
+    def kernel(self) -> Kernel | None:
         from labcrane_operator.compiled import CHANGING, DRAWN, hands  # noqa: PLC0415 - loads numba
 
         if not self._shown:
@@ -103,7 +103,7 @@ class SimulatedOperator(InputDevice):
             self._left, self._right, self._trigger, self._tip.start, self._velocity.start,
             self._target.start, self._radius,
         )  # fmt: skip
-        return Twin(hands, own, CHANGING, self._take_over, self._hand_back)
+        return Kernel(hands, own, CHANGING, self._take_over, self._hand_back)
 
     def _take_over(self, own: FloatArray, seen: Frame) -> bool:
         aimer = self._aimer

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from labcrane import FloatArray
-from labcrane.core import Places, compiled, twin
+from labcrane.core import Places, compiled, kernel
 
 ACTIVE, DOWN, SHARE, SWITCHES, BUTTON, BUTTON_SIGN, FIRST, SECOND, STEP = range(9)
 """Of the scheme: which law is active, whether the button is down, the second law's share of the
@@ -266,8 +266,8 @@ def _block(own: FloatArray) -> int:
 def command(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> int:
     """Make the command of a tick."""
     axes, out = (
-        row[places[twin.AXES] : places[twin.COMMAND]],
-        row[places[twin.COMMAND] : places[twin.STATE]],
+        row[places[kernel.AXES] : places[kernel.COMMAND]],
+        row[places[kernel.COMMAND] : places[kernel.STATE]],
     )
     if own[SWITCHES] != 0.0:
         down = own[BUTTON_SIGN] * axes[int(own[BUTTON])] > 0.5  # noqa: PLR2004 - as in the class
@@ -279,15 +279,15 @@ def command(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) 
         share = min(1.0, max(0.0, own[SHARE] + step))
         own[SHARE] = share
         if share not in (0.0, 1.0):
-            angles, size = seen[places[twin.STATE] :], len(out) - 1
+            angles, size = seen[places[kernel.STATE] :], len(out) - 1
             other = np.empty(size)
             _command(own, int(own[FIRST]), axes, angles, other)
             _command(own, int(own[SECOND]), axes, angles, out)
             for k in range(size):
                 out[k] = (1.0 - share) * other[k] + share * out[k]
-            return twin.MADE
-    _command(own, _block(own), axes, seen[places[twin.STATE] :], out)
-    return twin.MADE
+            return kernel.MADE
+    _command(own, _block(own), axes, seen[places[kernel.STATE] :], out)
+    return kernel.MADE
 
 
 @compiled.inverse
@@ -295,11 +295,11 @@ def hands(
     own: FloatArray, places: Places, velocity: FloatArray, seen: FloatArray, row: FloatArray
 ) -> int:
     """Put the axes that ask for a tip velocity into the row."""
-    at, angles = _block(own), seen[places[twin.STATE] :]
+    at, angles = _block(own), seen[places[kernel.STATE] :]
     n, stride = int(own[at + JOINTS]), int(own[at + STRIDE])
     axis, factor = _table(at, stride, AXIS), _table(at, stride, FACTOR)
     x, y, z = velocity[0], velocity[1], velocity[2]
-    axes = row[places[twin.AXES] : places[twin.COMMAND]]
+    axes = row[places[kernel.AXES] : places[kernel.COMMAND]]
     axes[:] = 0.0
     if own[at + RESOLVED] == 0.0:
         scale = _solve_base(own, at, angles, x, y, z)
@@ -309,7 +309,7 @@ def hands(
             if abs(speed) > NOTHING and left > 0.0:
                 share = scale * speed / (own[factor + j] * left)
                 axes[int(own[axis + j])] = _unshape(own, at, share)
-        return twin.MADE
+        return kernel.MADE
     if own[at + BASE] == 0.0:
         bearing = angles[0] + own[_table(at, stride, OFFSET)]
         cos, sin = math.cos(bearing), math.sin(bearing)
@@ -318,4 +318,4 @@ def hands(
     axes[int(own[axis])] = own[factor] * _unshape(own, at, x / most)
     axes[int(own[axis + 1])] = own[factor + 1] * _unshape(own, at, y / most)
     axes[int(own[axis + 2])] = own[factor + 2] * _unshape(own, at, z / most)
-    return twin.MADE
+    return kernel.MADE

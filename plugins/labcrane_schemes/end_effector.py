@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from labcrane import Controller, FloatArray, Machine, ProtocolError, Run
-from labcrane.core import Sphere, Twin, Value
+from labcrane.core import Kernel, Sphere, Value
 from labcrane.machines import Arm
 from labcrane_schemes.attainable import attainable
 from labcrane_schemes.axis_map import Axis, find_axes
-from labcrane_schemes.law import law, twin_numbers
+from labcrane_schemes.law import kernel_numbers, law
 from labcrane_schemes.resolved_rate import ResolvedRate
 from labcrane_schemes.settings import DIRECTIONS, EndEffectorSettings
 from labcrane_schemes.shaping import Shaping
@@ -106,12 +106,12 @@ class EndEffector(Controller):
 
     @property
     def law(self) -> FloatArray:
-        """What its compiled twin works with."""
+        """What its compiled kernel works with."""
         full = self._machine.speeds
         tip = (self._speed, self._base)
         return law(self._machine, self._axes, self._shaping, self._stops, self._rate, full, tip)
 
-    def twin(self) -> Twin:
+    def kernel(self) -> Kernel:
         from labcrane_schemes.compiled import command, hands  # noqa: PLC0415 - loads numba
 
-        return Twin(command, twin_numbers(self.law), changing=0, inverse=hands)
+        return Kernel(command, kernel_numbers(self.law), changing=0, inverse=hands)

@@ -7,10 +7,10 @@ from struct import Struct
 import numpy as np
 
 from labcrane import Controller, FloatArray, Machine, Run
-from labcrane.core import Sphere, Twin
+from labcrane.core import Kernel, Sphere
 from labcrane_schemes.attainable import attainable
 from labcrane_schemes.axis_map import Axis, check_joints, find_axes
-from labcrane_schemes.law import law, twin_numbers
+from labcrane_schemes.law import kernel_numbers, law
 from labcrane_schemes.resolved_rate import NOTHING, ResolvedRate
 from labcrane_schemes.settings import JointVelocitySettings
 from labcrane_schemes.shaping import Shaping
@@ -72,10 +72,10 @@ class JointVelocity(Controller):
 
     @property
     def law(self) -> FloatArray:
-        """What its compiled twin works with."""
+        """What its compiled kernel works with."""
         return law(self._machine, self._sticks, self._shaping, self._stops, self._rate, self._full)
 
-    def twin(self) -> Twin:
+    def kernel(self) -> Kernel:
         from labcrane_schemes.compiled import command, hands  # noqa: PLC0415 - loads numba
 
-        return Twin(command, twin_numbers(self.law), changing=0, inverse=hands)
+        return Kernel(command, kernel_numbers(self.law), changing=0, inverse=hands)

@@ -49,8 +49,8 @@ def law(
     return np.concatenate([head, tables.ravel()])
 
 
-def twin_numbers(first: FloatArray, second: FloatArray | None = None) -> FloatArray:
-    """Return what the twin of a scheme knows: of one law, or of two and a button."""
+def kernel_numbers(first: FloatArray, second: FloatArray | None = None) -> FloatArray:
+    """Return what the kernel of a scheme knows: of one law, or of two and a button."""
     from labcrane_schemes.compiled import FIRST, HEAD, SECOND  # noqa: PLC0415 - loads numba
 
     head = np.zeros(HEAD)

@@ -65,7 +65,7 @@ class ResolvedRate:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """What a compiled twin solves with."""
+        """What a compiled kernel solves with."""
         return (float(self._hold_pitch), self._damping2, self._threshold2)
 
     def solve_base(self, angles: Sequence[float], x: float, y: float, z: float) -> Motion:

@@ -29,7 +29,7 @@ class Shaping:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """What a compiled twin shapes with."""
+        """What a compiled kernel shapes with."""
         straight = float(self._straight)
         curve = (self._linear, self._expo, self._stretch, self._steepness, straight)
         return (self._edge, self._rest, *curve)

@@ -5,11 +5,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from labcrane import Controller, FloatArray, Frame, Machine, Run, Signal, Trial
-from labcrane.core import Places, Sphere, Twin, Value
+from labcrane.core import Kernel, Places, Sphere, Value
 from labcrane_schemes.axis_map import find_axis
 from labcrane_schemes.end_effector import EndEffector
 from labcrane_schemes.joint_velocity import JointVelocity
-from labcrane_schemes.law import twin_numbers
+from labcrane_schemes.law import kernel_numbers
 from labcrane_schemes.settings import SwitchableSettings
 from labcrane_schemes.signals import scheme_signals
 
@@ -83,7 +83,7 @@ class Switchable(Controller):
         self._out[-1] = self._active
         return self._out
 
-    def twin(self) -> Twin:
+    def kernel(self) -> Kernel:
         from labcrane_schemes.compiled import (  # noqa: PLC0415 - loads numba
             BUTTON,
             BUTTON_SIGN,
@@ -95,10 +95,10 @@ class Switchable(Controller):
         )
 
         first, second = self._schemes
-        own = twin_numbers(first.law, second.law)
+        own = kernel_numbers(first.law, second.law)
         own[SWITCHES], own[BUTTON], own[BUTTON_SIGN] = 1.0, self._index, self._sign
         own[STEP] = self._step
-        return Twin(command, own, CHANGING, self._take_over, self._hand_back, inverse=hands)
+        return Kernel(command, own, CHANGING, self._take_over, self._hand_back, inverse=hands)
 
     def _take_over(self, own: FloatArray, seen: Frame) -> bool:
         own[:3] = self._active, self._down, self._share

@@ -19,7 +19,7 @@ from labcrane.analysis.statistics.anova import Contrast, compare
 from labcrane.cli.app import main
 from results.consumers import needs_emmeans, needs_r, r, table
 
-# Without the compiled twins, half an hour.
+# Without the compiled kernels, half an hour.
 pytestmark = [pytest.mark.long, pytest.mark.timeout(1800), needs("numba"), needs_mujoco]
 
 STUDY = Path(__file__).parents[2] / "protocols" / "crane_pilot"

@@ -245,12 +245,12 @@ def test_a_codebook_has_the_columns_of_a_track(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @needs("numba")
-def test_compiled_twins_and_the_loop_choose_the_same_levels(tmp_path: Path) -> None:
+def test_compiled_kernels_and_the_loop_choose_the_same_levels(tmp_path: Path) -> None:
     protocol = tmp_path / "protocol.yaml"
     protocol.write_text(STAIRS)
-    by_twins = simulate(SimulationJob(protocol, None, tmp_path / "twins", "P001"))
+    by_kernels = simulate(SimulationJob(protocol, None, tmp_path / "kernels", "P001"))
     by_loop = simulate(SimulationJob(protocol, None, tmp_path / "loop", "P001", loop="asked for"))
-    assert json.loads((by_twins.path / "simulated_by.json").read_text())[0]["compiled"]
+    assert json.loads((by_kernels.path / "simulated_by.json").read_text())[0]["compiled"]
     for number in (1, 2):
         name = f"ses-{number:02}_run.xdf"
-        assert (by_twins.path / name).read_bytes() == (by_loop.path / name).read_bytes()
+        assert (by_kernels.path / name).read_bytes() == (by_loop.path / name).read_bytes()

@@ -1,4 +1,4 @@
-"""Compiled twins and the loop: the same bits, whatever the study; and which of them ran."""
+"""Compiled kernels and the loop: the same bits, whatever the study; and which of them ran."""
 
 import json
 import random
@@ -20,7 +20,7 @@ CH8 = ("slew", "shoulder", "elbow", "wrist")
 
 HEAD = """\
 labcrane: 1
-study: twins
+study: kernels
 title: Drawn at random
 participants: {pattern: 'P\\d{3}', planned: 12}
 input: {use: dual_joystick}
@@ -31,7 +31,7 @@ ARM = "map: {radial: left.y, tangential: -left.x, vertical: right.y}, frame: arm
 
 
 def drawn_study(seed: int, scheme: str, rule: str) -> str:
-    """Return a protocol with everything that a twin must follow drawn at random."""
+    """Return a protocol with everything that a kernel must follow drawn at random."""
     draw = random.Random(seed)
 
     def handling() -> str:
@@ -127,7 +127,7 @@ RULES = ("rest_inside", "rest_anywhere", "trigger")
 @pytest.mark.parametrize(
     ("scheme", "rule"), [(scheme, rule) for scheme in SCHEMES for rule in RULES]
 )
-def test_twins_make_the_bits_of_the_loop_in_journals_and_participant_files(
+def test_kernels_make_the_bits_of_the_loop_in_journals_and_participant_files(
     tmp_path: Path, scheme: str, rule: str
 ):
     need("numba")
@@ -150,7 +150,7 @@ def test_twins_make_the_bits_of_the_loop_in_journals_and_participant_files(
     ("engine", "package"), [("bullet_crane", "pybullet"), ("mujoco_crane", "mujoco")]
 )
 @pytest.mark.parametrize("rule", RULES)
-def test_an_engine_goes_on_where_its_twin_came_so_that_both_ways_do_the_same_study(
+def test_an_engine_goes_on_where_its_kernel_came_so_that_both_ways_do_the_same_study(
     tmp_path: Path, engine: str, package: str, rule: str
 ):
     need("numba", package)
@@ -177,13 +177,13 @@ def test_an_engine_goes_on_where_its_twin_came_so_that_both_ways_do_the_same_stu
 
 
 @pytest.mark.long
-def test_a_study_with_one_component_without_a_twin_is_simulated_by_the_loop_and_says_so(
+def test_a_study_with_one_component_without_a_kernel_is_simulated_by_the_loop_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     need("numba")
     from labcrane_schemes.joint_velocity import JointVelocity
 
-    monkeypatch.setattr(JointVelocity, "twin", lambda scheme: None)
+    monkeypatch.setattr(JointVelocity, "kernel", lambda scheme: None)
     protocol = tmp_path / "protocol.yaml"
     written(tmp_path, drawn_study(1, "joint_velocity", "rest_inside"))
     _, way = simulated(protocol, tmp_path / "data")

@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
-from labcrane.core import compiled, twin
-from labcrane.core.twin import Places
+from labcrane.core import compiled, kernel
+from labcrane.core.kernel import Places
 from labcrane.machines.machine import GRAVITY, Machine
 from labcrane.types import FloatArray
 
@@ -73,7 +73,7 @@ def put_tip(own: FloatArray, angles: FloatArray, speeds: FloatArray, tip: FloatA
 def step(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> int:
     """Move the crane for a tick."""
     n, at, dt = int(own[JOINTS]), int(own[CHANGES]), own[DT]
-    state, drive = places[twin.STATE], places[twin.COMMAND] + int(own[DRIVE])
+    state, drive = places[kernel.STATE], places[kernel.COMMAND] + int(own[DRIVE])
     angles, speeds = row[state : state + n], row[state + n : state + 2 * n]
     follow(own, at, row[drive : drive + n], speeds)
     low, high = TABLES + n, TABLES + 2 * n
@@ -84,7 +84,7 @@ def step(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> 
             speeds[j] = 0.0
         own[at + j] = angles[j] = angle
     put_tip(own, angles, speeds, row[state + 2 * n : state + 2 * n + 6])
-    return twin.MADE
+    return kernel.MADE
 
 
 MASS, CENTRE, ALONG, ACROSS, UPRIGHT, EFFORT = range(6)
@@ -151,23 +151,23 @@ def torques_suffice(
 def step_engine(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> int:
     """Move the engine's crane for a tick, if its motors can."""
     n, at, dt = int(own[JOINTS]), int(own[CHANGES]), own[DT]
-    state, drive = places[twin.STATE], places[twin.COMMAND] + int(own[DRIVE])
+    state, drive = places[kernel.STATE], places[kernel.COMMAND] + int(own[DRIVE])
     angles, speeds = row[state : state + n], row[state + n : state + 2 * n]
     follow(own, at, row[drive : drive + n], speeds)
     before, was = own[at : at + n], own[at + n : at + 2 * n]
     loads = row[state + 2 * n + 6 : state + 3 * n + 6]
     if not torques_suffice(own, before, was, speeds, loads):
-        return twin.DECLINED
+        return kernel.DECLINED
     low, high = TABLES + n, TABLES + 2 * n
     for j in range(n):
         angle = before[j] + speeds[j] * dt
         if not own[low + j] + NEAR < angle < own[high + j] - NEAR:
-            return twin.DECLINED
+            return kernel.DECLINED
         angles[j] = angle
     row[state + 3 * n + 6 : state + 4 * n + 6] = 0.0  # no motor gives all it has
     own[at : at + n], own[at + n : at + 2 * n] = angles, speeds
     put_tip(own, angles, speeds, row[state + 2 * n : state + 2 * n + 6])
-    return twin.MADE
+    return kernel.MADE
 
 
 def links_of(machine: Machine) -> list[float]:

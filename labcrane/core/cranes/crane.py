@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from labcrane.core.cranes.crane_settings import CraneSettings
+from labcrane.core.kernel import STATE, Kernel, Places
 from labcrane.core.records import Frame, Run, Value
 from labcrane.core.roles import Dynamics
 from labcrane.core.signals import Signal
-from labcrane.core.twin import STATE, Places, Twin
 from labcrane.errors import PluginError, ProtocolError
 from labcrane.machines.actuator import Actuator
 from labcrane.machines.crane_state import CraneState
@@ -107,16 +107,16 @@ class Crane(Dynamics):
         actuator = self._settings.actuator.model_dump()
         return {f"actuator.{name}": value for name, value in actuator.items()}
 
-    def law_twin(self) -> Twin:
+    def law_kernel(self) -> Kernel:
         """Return the kernel of a crane that follows the velocity law in every tick.
 
         Its :meth:`_stand` and :meth:`_motion` set and return its state for the kernel.
         """
         from labcrane.core.cranes.compiled_crane import step  # noqa: PLC0415 - loads numba
 
-        return self._twin_of(step)
+        return self._kernel_of(step)
 
-    def engine_twin(self) -> Twin | None:
+    def engine_kernel(self) -> Kernel | None:
         """Return the kernel of a crane in an engine, for ticks in which all drives have the torque.
 
         All other ticks are the engine's. None for a crane that is not made of beams on the slew
@@ -127,9 +127,11 @@ class Crane(Dynamics):
             return None
         from labcrane.core.cranes.compiled_crane import links_of, step_engine  # noqa: PLC0415 - loads numba
 
-        return self._twin_of(step_engine, links_of(self._machine), ENGINE_DEVIATION)
+        return self._kernel_of(step_engine, links_of(self._machine), ENGINE_DEVIATION)
 
-    def _twin_of(self, step: object, further: Sequence[float] = (), deviation: float = 0.0) -> Twin:
+    def _kernel_of(
+        self, step: object, further: Sequence[float] = (), deviation: float = 0.0
+    ) -> Kernel:
         """Return the kernel for a compiled ``step``.
 
         It is given the numbers of the machine and of its actuator, ``further`` ones, then angles,
@@ -145,7 +147,7 @@ class Crane(Dynamics):
         lengths, offsets = zip(*((joint.a, joint.offset) for joint in joints), strict=True)
         moving = [0.0] * (len(joints) * (3 + actuator.delay))
         own = np.array([*head, *most, *low, *high, *lengths, *offsets, *further, *moving])
-        return Twin(step, own, len(own), self._take_over, self._hand_back, deviation=deviation)
+        return Kernel(step, own, len(own), self._take_over, self._hand_back, deviation=deviation)
 
     def _take_over(self, own: FloatArray, seen: Frame) -> bool:
         angles, speeds = self._motion()

@@ -141,7 +141,7 @@ class LoadedCrane(Crane):
         self._load = HangingLoad(machine, settings, self.signals)
         self.signals = self._load.signals
 
-    def twin(self) -> None:
+    def kernel(self) -> None:
         return None  # what hangs on it moves by the engine's law
 
     def state(self) -> FloatArray:

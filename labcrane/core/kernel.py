@@ -1,7 +1,7 @@
 """Compiled kernel of a component's tick, for simulations.
 
-A component can also offer its tick as a compiled function: :meth:`labcrane.Component.twin`. If the
-operator, the scheme, the machine and the task of a study all have one, ``labcrane simulate``
+A component can also offer its tick as a compiled function: :meth:`labcrane.Component.kernel`. If
+the operator, the scheme, the machine and the task of a study all have one, ``labcrane simulate``
 computes most ticks by them, about a hundred times faster; otherwise by the loop. Both give the same
 bits, which ``labcrane.testing`` checks tick by tick.
 
@@ -45,7 +45,7 @@ def _nothing(_own: FloatArray, _rows: FloatArray, _places: Places) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Twin:
+class Kernel:
     """The compiled tick of one component, and its state.
 
     Attributes

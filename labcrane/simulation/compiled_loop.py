@@ -9,7 +9,7 @@ from numba import types
 from numba.extending import typeof_impl
 
 from labcrane.core.compiled import as_signed, compile_function, signatures
-from labcrane.core.twin import AXES, MADE, TASK, Places
+from labcrane.core.kernel import AXES, MADE, TASK, Places
 from labcrane.types import FloatArray
 
 _NUMBERS = types.Array(types.float64, 1, "C")

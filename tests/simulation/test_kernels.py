@@ -1,4 +1,4 @@
-"""Every bundled twin beside its component, tick by tick."""
+"""Every bundled kernel beside its component, tick by tick."""
 
 from itertools import product
 
@@ -9,7 +9,7 @@ from needs import need, needs
 from labcrane import Controller
 from labcrane.core import CraneSettings
 from labcrane.core.roles import Component
-from labcrane.testing import TwinContract, ch8
+from labcrane.testing import KernelContract, ch8
 from labcrane_aiming.aiming import Aiming
 from labcrane_aiming.settings import AimingSettings
 from labcrane_bullet.kinematic_crane import KinematicCrane
@@ -30,7 +30,7 @@ JOINTS = JointVelocitySettings(
 TIP = EndEffectorSettings(map={"x": "left.y", "y": "-left.x", "z": "right.y"}, soft_stop_deg=40.0)
 
 
-class TestSchemes(TwinContract):
+class TestSchemes(KernelContract):
     @pytest.fixture(params=["joint_velocity", "end_effector", "switchable"])
     def component(self, request: pytest.FixtureRequest) -> Controller:
         match request.param:
@@ -42,7 +42,7 @@ class TestSchemes(TwinContract):
         return Switchable(both, ch8())
 
 
-class TestCranes(TwinContract):
+class TestCranes(KernelContract):
     @pytest.fixture(params=["ideal", "electric", "hydraulic", "sluggish"])
     def component(self, request: pytest.FixtureRequest) -> Component:
         return KinematicCrane(CraneSettings.model_validate({"actuator": request.param}), ch8())
@@ -51,7 +51,7 @@ class TestCranes(TwinContract):
 ENGINES = ("bullet_crane", "mujoco_crane")
 
 
-class TestEngines(TwinContract):
+class TestEngines(KernelContract):
     @pytest.fixture(params=list(product(ENGINES, [{"lag_s": 0.5}, "hydraulic", "ideal"])), ids=str)
     def component(self, request: pytest.FixtureRequest) -> Component:
         engine, actuator = request.param
@@ -60,24 +60,24 @@ class TestEngines(TwinContract):
         return build(engine, ch8(), actuator)
 
 
-class TestTask(TwinContract):
+class TestTask(KernelContract):
     @pytest.fixture(params=["rest_inside", "rest_anywhere", "trigger"])
     def component(self, request: pytest.FixtureRequest) -> Component:
         return Aiming(AimingSettings(end=request.param), ch8())
 
 
-class TestOperator(TwinContract):
+class TestOperator(KernelContract):
     @pytest.fixture
     def component(self) -> Component:
         return SimulatedOperator(OperatorSettings())
 
 
-def test_a_twin_that_differs_by_a_bit_breaks_the_contract() -> None:
+def test_a_kernel_that_differs_by_a_bit_breaks_the_contract() -> None:
     class Off(KinematicCrane):
         def step(self, command, dt):
             return super().step(command * (1.0 + 2.3e-16), dt)
 
-    with pytest.raises(AssertionError, match=r"in tick \d+ the twin made"):
-        TwinContract().test_twin_makes_its_components_numbers_tick_by_tick(
+    with pytest.raises(AssertionError, match=r"in tick \d+ the kernel made"):
+        KernelContract().test_kernel_makes_its_components_numbers_tick_by_tick(
             Off(CraneSettings(), ch8())
         )

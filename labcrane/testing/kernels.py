@@ -1,13 +1,13 @@
-"""Contract of compiled twins: the same numbers as their component, tick by tick."""
+"""Contract of compiled kernels: the same numbers as their component, tick by tick."""
 
 from collections.abc import Callable
 from functools import cache
 
 import numpy as np
 
+from labcrane.core.kernel import MADE, Kernel, Places
 from labcrane.core.records import Frame, Run, Trial
 from labcrane.core.roles import Component, Controller, Dynamics, InputDevice, Task
-from labcrane.core.twin import MADE, Places, Twin
 from labcrane.recording.frame_log import LOOP, FrameRow, sizes
 from labcrane.testing.presentation import TARGETS
 from labcrane.testing.roles import (
@@ -24,24 +24,24 @@ from labcrane.types import FloatArray
 
 TICKS = 400
 MOST_DECLINED = 0.5
-"""Share of ticks that a twin may decline: with more it saves nothing."""
+"""Share of ticks that a kernel may decline: with more it saves nothing."""
 
 
-class TwinContract:
-    """What every twin must do. Provide the fixture ``component``: built, and not yet open.
+class KernelContract:
+    """What every kernel must do. Provide the fixture ``component``: built, and not yet open.
 
     It is an input device, a controller, a machine or a task, and needs numba.
     """
 
-    def test_twin_makes_its_components_numbers_tick_by_tick(self, component: Component) -> None:
+    def test_kernel_makes_its_components_numbers_tick_by_tick(self, component: Component) -> None:
         run = _run(component)
         with opened(component, run):
             trial = _trial(component)
             component.begin_trial(trial)
-            twin = component.twin()
+            kernel = component.kernel()
             name = type(component).__name__
-            assert twin is not None, f"{name}.twin() returns None: it has none to be checked"
-            declined = _compare(component, twin, run)
+            assert kernel is not None, f"{name}.kernel() returns None: it has none to be checked"
+            declined = _compare(component, kernel, run)
             assert declined <= MOST_DECLINED * TICKS, f"it declined {declined} of {TICKS} ticks"
 
 
@@ -71,7 +71,7 @@ def _hands_of(velocity: FloatArray, state: FloatArray) -> FloatArray:
     return axes
 
 
-def _compare(component: Component, twin: Twin, run: Run) -> int:
+def _compare(component: Component, kernel: Kernel, run: Run) -> int:
     """Compare tick by tick; return how many were declined."""
     places = np.cumsum([len(LOOP), *sizes(run)]).astype(np.int64)
     rows = FrameRow(sizes(run))
@@ -87,16 +87,16 @@ def _compare(component: Component, twin: Twin, run: Run) -> int:
         rows.fill(seen_row, seen)
         rows.fill(row, frame)
         if not ready:
-            ready = twin.take_over(twin.own, seen)
-        kept = twin.own[: twin.changing].copy()
-        made = ready and _tick(component, twin, places, seen_row, row) == MADE
+            ready = kernel.take_over(kernel.own, seen)
+        kept = kernel.own[: kernel.changing].copy()
+        made = ready and _tick(component, kernel, places, seen_row, row) == MADE
         wanted, plain = _make(component, frame, seen, run)
         if made:
-            assert plain, f"in tick {number} something happened, and the twin did not decline"
-            _check(row[mine], wanted, twin.deviation, number)
+            assert plain, f"in tick {number} something happened, and the kernel did not decline"
+            _check(row[mine], wanted, kernel.deviation, number)
         else:
             declined += 1
-            twin.own[: twin.changing], ready = kept, False
+            kernel.own[: kernel.changing], ready = kept, False
         seen = frame
     return declined
 
@@ -121,11 +121,11 @@ def _frames(run: Run, random: np.random.Generator) -> Callable[[int], Frame]:
 
 
 def _tick(
-    component: Component, twin: Twin, places: Places, seen: FloatArray, row: FloatArray
+    component: Component, kernel: Kernel, places: Places, seen: FloatArray, row: FloatArray
 ) -> int:
     if not isinstance(component, InputDevice):
-        return int(twin.tick(twin.own, places, seen, row))
-    return int(twin.tick(twin.own, places, seen, row, _stand_in(), np.empty(0)))
+        return int(kernel.tick(kernel.own, places, seen, row))
+    return int(kernel.tick(kernel.own, places, seen, row, _stand_in(), np.empty(0)))
 
 
 @cache
@@ -166,5 +166,5 @@ def _check(got: FloatArray, wanted: FloatArray, deviation: float, number: int) -
     if not same and not (deviation and np.abs(got - wanted).max() <= deviation):
         off = float(np.abs(got - wanted).max())
         raise AssertionError(
-            f"in tick {number} the twin made {got}, and the component {wanted}: {off:.3g} apart"
+            f"in tick {number} the kernel made {got}, and the component {wanted}: {off:.3g} apart"
         )
