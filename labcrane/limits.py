@@ -76,20 +76,20 @@ LIMITS: Mapping[str, Limit] = {
         "monitors look at the next ones; the record has all",
     ),
     "request body": Limit(
-        32_000, "bytes", 0, "any", "web.door.guard", "status 413 before it is buffered"
+        32_000, "bytes", 0, "any", "web.server.guard", "status 413 before it is buffered"
     ),
     "message of a page": Limit(
-        64_000, "bytes", 0, "any", "web.door.guard", "the socket is closed with 1009"
+        64_000, "bytes", 0, "any", "web.server.guard", "the socket is closed with 1009"
     ),
     "requests of one address": Limit(
-        200, "requests a second", 0, "any", "web.door.guard", "status 429; one event a second"
+        200, "requests a second", 0, "any", "web.server.guard", "status 429; one event a second"
     ),
     "page loads of one address": Limit(
         5,
         "loads a second, 30 at once",
         0,
         "any",
-        "web.door.guard",
+        "web.server.guard",
         "status 429; one event a second",
     ),
     "orders of one page": Limit(

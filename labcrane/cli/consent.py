@@ -37,7 +37,7 @@ class Missing:
         """Put the consent into the register."""
         from labcrane.participants.enrolment import confirm_consent
         from labcrane.participants.folders import Places
-        from labcrane.web.door.access import PARTICIPANT
+        from labcrane.web.server.access import PARTICIPANT
 
         visit = self.visit
         who: Literal["participant", "examiner"] = "participant" if by == PARTICIPANT else "examiner"

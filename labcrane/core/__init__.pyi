@@ -3,7 +3,7 @@
 from . import compiled, kernel
 from .cranes.crane import Crane
 from .cranes.crane_settings import CraneSettings, GrappleSettings, LoadedCraneSettings
-from .cranes.hanging import LoadedCrane
+from .cranes.load import LoadedCrane
 from .findings import Finding, Verdict
 from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .kernel import Kernel, Places

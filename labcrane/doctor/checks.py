@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from labcrane.core.findings import Finding, Verdict
-from labcrane.doctor import apart, clock, components, disk, scheduling, screen, windows
+from labcrane.doctor import check_process, clock, components, disk, scheduling, screen, windows
+from labcrane.doctor.check_process import Call
 from labcrane.doctor.report import Check, Diagnosis, as_data, diagnosis, keep, latest
 from labcrane.doctor.versions import versions
 from labcrane.protocol.study import Study
@@ -47,15 +48,15 @@ def examine(
     rate_hz = study.protocol.rate_hz if study else RATE_HZ
     yield from _checks("version", (Finding(Verdict.PASS, line) for line in versions()))
     for area, call in (
-        ("clock", apart.Call("the clock", OTHERWISE, clock.examine)),
-        ("scheduling", apart.Call("scheduling", OTHERWISE, scheduling.examine, (rate_hz,))),
-        ("screen", apart.Call("the screen", OTHERWISE, screen.examine)),
-        ("disk", apart.Call(f"folder {data}", UNMOUNTED, disk.examine, (data, needed_bytes))),
+        ("clock", Call("the clock", OTHERWISE, clock.examine)),
+        ("scheduling", Call("scheduling", OTHERWISE, scheduling.examine, (rate_hz,))),
+        ("screen", Call("the screen", OTHERWISE, screen.examine)),
+        ("disk", Call(f"folder {data}", UNMOUNTED, disk.examine, (data, needed_bytes))),
     ):
-        yield from _checks(area, apart.examine(call))
+        yield from _checks(area, check_process.examine(call))
     if windows.APPLIES:
-        settings = apart.Call("settings of Windows", OTHERWISE, windows.examine, (data,))
-        yield from _checks("windows", apart.examine(settings))
+        settings = Call("settings of Windows", OTHERWISE, windows.examine, (data,))
+        yield from _checks("windows", check_process.examine(settings))
     if study:
         yield from _checks("scheme", directions(study))
     looks = components.of_study(study, registry) if study else components.of_everything(registry)[0]
@@ -77,7 +78,7 @@ def left_out(registry: Registry, study: Study | None) -> Sequence[str]:
 
 def keep_apart(found: Diagnosis, data: Path) -> Finding:
     """Store a diagnosis in the data folder; a folder that hangs or is not writable is a finding."""
-    (finding,) = apart.examine(apart.Call(f"folder {data}", UNMOUNTED, _keep, (found, data)))
+    (finding,) = check_process.examine(Call(f"folder {data}", UNMOUNTED, _keep, (found, data)))
     return finding
 
 
@@ -113,11 +114,11 @@ def _network(study: Study | None, peers: Sequence[str]) -> Iterator[Check]:
         need.request(label, required=need.required, expected=expected)
         for label, need in needs.items()
     ]
-    streams = apart.Call("LSL streams", UNPLUGGED, lsl.examine, (requests,))
-    yield from _checks("lsl", apart.examine(streams))
+    streams = Call("LSL streams", UNPLUGGED, lsl.examine, (requests,))
+    yield from _checks("lsl", check_process.examine(streams))
     for peer in peers:
-        call = apart.Call(f"peer {peer}", UNPLUGGED, lsl.ask_peer, (peer,))
-        yield from _checks(f"lsl {peer}", apart.examine(call))
+        call = Call(f"peer {peer}", UNPLUGGED, lsl.ask_peer, (peer,))
+        yield from _checks(f"lsl {peer}", check_process.examine(call))
 
 
 def _checks(area: str, findings: Iterable[Finding]) -> Iterator[Check]:

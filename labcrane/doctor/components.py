@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from labcrane.core.findings import Finding
 from labcrane.core.settings import Settings
-from labcrane.doctor import apart
+from labcrane.doctor import check_process
 from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.study import Study
 from labcrane.registry.hookspecs import ROLES
@@ -69,7 +69,7 @@ class PackedLook:
 
     fix: ClassVar = "check its driver, or report it to the plugin's author"
 
-    def prepared(self) -> Callable[[apart.Tell | None], Iterable[Finding]]:
+    def prepared(self) -> Callable[[check_process.Tell | None], Iterable[Finding]]:
         """Load the plugins; return what examines."""
         registry = discover(study=self.study)
         look: ExaminedPart = pickle.loads(self.look)  # noqa: S301 - from the process that started this one
@@ -131,6 +131,6 @@ def of_everything(registry: Registry) -> tuple[list[ExaminedPart], list[str]]:
 
 def examine(look: ExaminedPart, *, move: bool) -> Sequence[Finding]:
     """Return the plugin's findings; ``move`` if a person is there to move things."""
-    wait_s = apart.WAIT_S * (MOVING if move else 1.0)
+    wait_s = check_process.WAIT_S * (MOVING if move else 1.0)
     packed = PackedLook(f"{look.role} {look.name!r}", pickle.dumps(look), look.study)
-    return apart.examine(packed, wait_s=wait_s, asks=move)
+    return check_process.examine(packed, wait_s=wait_s, asks=move)

@@ -6,7 +6,7 @@ from pathlib import Path
 from labcrane.analysis.presented import PresentedLimits, operators_views
 from labcrane.core.findings import Finding, Verdict
 from labcrane.core.records import Frame, SessionState
-from labcrane.doctor.apart import Call
+from labcrane.doctor.check_process import Call
 from labcrane.errors import DeviceError
 from labcrane.feedback.presenter import Presenter
 from labcrane.feedback.preview import chosen

@@ -3,13 +3,13 @@
 from typing import Any
 
 from labcrane.session.commands import Order
-from labcrane.web.door.access import SUPERVISOR
+from labcrane.web.control_room.snapshot import Snapshot
 from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PRIMARY, PageContext, keep_drafts, see_through, speak
 from labcrane.web.panels import Cameras, Reports
 from labcrane.web.participant_page import STYLE as FORM_STYLE
-from labcrane.web.room.snapshot import Snapshot
 from labcrane.web.scene import SceneView
+from labcrane.web.server.access import SUPERVISOR
 
 RATE_S = 0.25
 
@@ -37,7 +37,7 @@ def supervisor_page(context: PageContext) -> None:
     """Build the page."""
     from nicegui import ui  # noqa: PLC0415 - loads for a second
 
-    from labcrane.web.room.element import STYLE, Room  # noqa: PLC0415
+    from labcrane.web.control_room.element import STYLE, Room  # noqa: PLC0415
 
     ui.page_title(f"{context.participant} · labcrane")
     ui.colors(primary=PRIMARY)

@@ -12,7 +12,7 @@ from labcrane.web.page import PageContext
 if TYPE_CHECKING:
     from nicegui import ui
 
-from labcrane.web.door.access import PARTICIPANT
+from labcrane.web.server.access import PARTICIPANT
 
 HEADING = "role=heading aria-level=2"
 MOST_TICKS = 21

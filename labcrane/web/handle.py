@@ -11,7 +11,7 @@ from labcrane.core.records import Event
 from labcrane.errors import DeviceError
 from labcrane.processes.handle import Patience, ProcessHandle
 from labcrane.session.commands import Command
-from labcrane.web.door.access import NAMES
+from labcrane.web.server.access import NAMES
 from labcrane.web.service import Closed, Opened, PageConfig, Report, Served, Streams, Used
 from labcrane.web.state import SessionLeft
 

@@ -8,12 +8,12 @@ from labcrane.design.plan import SessionPlan
 from labcrane.limits import LIMITS
 from labcrane.protocol.study import Study
 from labcrane.session.commands import Command, Order, beyond_limits
-from labcrane.web.door.access import NAMES, PARTICIPANT, RIGHTS
-from labcrane.web.door.denials import Bucket
+from labcrane.web.control_room.earlier import Earlier
+from labcrane.web.control_room.shown import ShownShapes
 from labcrane.web.live import Live
 from labcrane.web.pictures import Pictures
-from labcrane.web.room.earlier import Earlier
-from labcrane.web.room.shown import ShownShapes
+from labcrane.web.server.access import NAMES, PARTICIPANT, RIGHTS
+from labcrane.web.server.denials import Bucket
 from labcrane.web.state import SessionView
 from labcrane.web.translations import WORDS, Words
 

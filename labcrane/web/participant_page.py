@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from labcrane.web.door.access import PARTICIPANT
 from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PageContext, keep_drafts, speak
 from labcrane.web.panels import Reports
+from labcrane.web.server.access import PARTICIPANT
 
 STYLE = Path(__file__).with_name("form.css")
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 from labcrane.core.records import Run
 from labcrane.machines.links import link_boxes
+from labcrane.web.control_room.model import MachineModel, span
 from labcrane.web.page import PageContext
-from labcrane.web.room.model import MachineModel, span
 from labcrane.web.surroundings import Surroundings
 
 RATE_S = 0.1

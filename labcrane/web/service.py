@@ -21,14 +21,14 @@ from labcrane.processes.parent import Parent
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
-from labcrane.web.door.access import SCOPE, SUPERVISOR, AccessKeys, Gate
-from labcrane.web.door.denials import Denials
-from labcrane.web.door.serving import AWAY_S, MOST_HEAD, announcing, build_pages
+from labcrane.web.control_room.earlier import Earlier, read_behind
+from labcrane.web.control_room.shown import ShownShapes
 from labcrane.web.live import Live
 from labcrane.web.page import PageContext
 from labcrane.web.pictures import Pictures
-from labcrane.web.room.earlier import Earlier, read_behind
-from labcrane.web.room.shown import ShownShapes
+from labcrane.web.server.access import SCOPE, SUPERVISOR, AccessKeys, Gate
+from labcrane.web.server.denials import Denials
+from labcrane.web.server.serving import AWAY_S, MOST_HEAD, announcing, build_pages
 from labcrane.web.state import SessionLeft, SessionView
 
 FORBIDDEN, NOT_FOUND = 403, 404
@@ -130,7 +130,7 @@ def serve(order: PageConfig, parent: Parent) -> None:
     import uvicorn  # noqa: PLC0415
     from fastapi import FastAPI  # noqa: PLC0415 - loads for a second
 
-    from labcrane.web.door.guard import BoundedProtocol, Guard  # noqa: PLC0415
+    from labcrane.web.server.guard import BoundedProtocol, Guard  # noqa: PLC0415
 
     study = load(order.protocol, discover(study=order.protocol), recorded=order.recorded)
     plan = plan_session(study, order.participant, order.session)

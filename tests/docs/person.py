@@ -2,7 +2,6 @@
 
 import math
 import os
-import pty
 import re
 import select
 import shlex
@@ -39,7 +38,7 @@ class Person:
         if not pipe.exists():
             os.mkfifo(pipe)
         self._hands = os.open(pipe, os.O_RDWR)
-        self._terminal, theirs = pty.openpty()
+        self._terminal, theirs = os.openpty()
         program, *words = shlex.split(command)
         if program == "python":
             program, *words = words[1:]

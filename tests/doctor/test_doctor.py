@@ -13,7 +13,7 @@ from rehearsal import SHORT, ScriptedConsole
 import labcrane
 from labcrane.cli.app import main
 from labcrane.core.findings import Finding, Verdict
-from labcrane.doctor import apart, components
+from labcrane.doctor import check_process, components
 from labcrane.doctor.checks import examine, keep_apart
 from labcrane.doctor.components import ExaminedPart, of_everything, of_study, unexamined
 from labcrane.doctor.report import Check, diagnosis, keep, latest
@@ -100,7 +100,7 @@ def test_a_plugins_look_cannot_harm_the_doctor(
     verdict: Verdict,
     text: str,
 ) -> None:
-    monkeypatch.setattr(apart, "WAIT_S", 8.0 if does == "hangs" else 30.0)
+    monkeypatch.setattr(check_process, "WAIT_S", 8.0 if does == "hangs" else 30.0)
     look = ExaminedPart("feedback lamp", "feedback", "lamp", lamp.model_validate({"does": does}))
     (found,) = components.examine(look, move=False)
     assert (found.verdict, found.text) == (verdict, text)
@@ -121,7 +121,7 @@ def test_a_data_folder_that_hangs_is_named_and_the_rest_is_looked_at(
 ) -> None:
     (tmp_path / "sitecustomize.py").write_text(SITE)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(apart, "WAIT_S", 4.0)
+    monkeypatch.setattr(check_process, "WAIT_S", 4.0)
     (tmp_path / "study.yaml").write_text(SHORT)
     registry = discover()
     study = load(tmp_path / "study.yaml", registry)
@@ -154,11 +154,11 @@ def test_no_examination_is_made_in_the_doctors_own_process(
     monkeypatch.setattr(f"labcrane.doctor.{module}.{function}", still)
     made = []
 
-    def noted(call: apart.Call, **_: object) -> list[Finding]:
+    def noted(call: check_process.Call, **_: object) -> list[Finding]:
         made.append(getattr(call, "function", None))
         return []
 
-    monkeypatch.setattr(apart, "examine", noted)
+    monkeypatch.setattr(check_process, "examine", noted)
     (tmp_path / "study.yaml").write_text(SHORT)
     registry = discover()
     study = load(tmp_path / "study.yaml", registry)
@@ -176,7 +176,7 @@ def test_a_process_that_cannot_be_ended_keeps_the_doctor_no_longer_than_its_pati
         return stop(self)
 
     monkeypatch.setattr(ProcessHandle, "stop", late)
-    monkeypatch.setattr(apart, "END_S", 0.1)
+    monkeypatch.setattr(check_process, "END_S", 0.1)
     try:
         found = keep_apart(diagnosis([]), tmp_path)
         assert found.text.startswith(f"saved in {tmp_path}")

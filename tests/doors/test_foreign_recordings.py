@@ -187,7 +187,7 @@ def test_processes_take_no_module_from_the_folder_somebody_stands_in(
     for name in ("json", "labcrane", "numpy", "runpy"):
         (tmp_path / f"{name}.py").write_text(EVIL.format(mark=str(mark)), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    child = ProcessHandle("labcrane.doctor.apart", "look")
+    child = ProcessHandle("labcrane.doctor.check_process", "look")
     child.start()
     child.stop()
     assert not mark.exists()

@@ -3,7 +3,7 @@
 import asyncio
 from typing import Any
 
-from labcrane.web.door.access import SCOPE, AccessKeys, Gate
+from labcrane.web.server.access import SCOPE, AccessKeys, Gate
 
 
 class Door:

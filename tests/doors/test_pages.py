@@ -18,8 +18,8 @@ from labcrane import ProtocolError, open_recording
 from labcrane.launcher.pages import _tls
 from labcrane.limits import LIMITS
 from labcrane.protocol.pages import PageSettings
-from labcrane.web.door.denials import Bucket, Denials
-from labcrane.web.door.guard import HEADERS, Guard
+from labcrane.web.server.denials import Bucket, Denials
+from labcrane.web.server.guard import HEADERS, Guard
 
 HOST, PORT = "127.0.0.1", 8123
 

@@ -27,7 +27,7 @@ from labcrane.launcher.pages import left_behind
 from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.visit import Visit, visit_of
 from labcrane.streams.recorder.process import STATUS_S
-from labcrane.web.room.condition import ExpectedSession, Lamp, lamp_of
+from labcrane.web.control_room.condition import ExpectedSession, Lamp, lamp_of
 from labcrane.web.state import SessionView
 from labcrane_tables.settings import TableSettings
 from labcrane_tables.tables import Tables

@@ -22,7 +22,7 @@ from simple_crane import FORM
 
 from labcrane.launcher import session_process
 from labcrane.web import service
-from labcrane.web.door.access import NAMES
+from labcrane.web.server.access import NAMES
 
 STUDY = (
     """\

@@ -11,8 +11,8 @@ from recording.test_outdated import faulty
 from labcrane import ProtocolError
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
-from labcrane.web.door.access import NAMES
 from labcrane.web.handle import PageHandle, free_port
+from labcrane.web.server.access import NAMES
 from labcrane.web.service import PageConfig
 from labcrane.web.state import SessionLeft
 

@@ -25,18 +25,18 @@ from labcrane.session.live_settings import FeedbackSettings
 from labcrane.streams.recorder.candidates import answered
 from labcrane.testing import ch8
 from labcrane.web import handle
+from labcrane.web.control_room import shown
+from labcrane.web.control_room.bars import groups
+from labcrane.web.control_room.buttons import answers, buttons
+from labcrane.web.control_room.condition import STATES, ExpectedSession, Lamp, lamp_of, state_of
+from labcrane.web.control_room.earlier import FEWEST, Earlier, read_behind
+from labcrane.web.control_room.sentences import KINDS, SAID, sentence
+from labcrane.web.control_room.shown import ShownShapes
+from labcrane.web.control_room.sliders import sliders
+from labcrane.web.control_room.snapshot import Snapshot, clock
 from labcrane.web.examiner_page import KEYS
 from labcrane.web.live import Live
 from labcrane.web.pictures import Pictures
-from labcrane.web.room import shown
-from labcrane.web.room.bars import groups
-from labcrane.web.room.buttons import answers, buttons
-from labcrane.web.room.condition import STATES, ExpectedSession, Lamp, lamp_of, state_of
-from labcrane.web.room.earlier import FEWEST, Earlier, read_behind
-from labcrane.web.room.sentences import KINDS, SAID, sentence
-from labcrane.web.room.shown import ShownShapes
-from labcrane.web.room.sliders import sliders
-from labcrane.web.room.snapshot import Snapshot, clock
 from labcrane.web.service import Opened, PageConfig, Streams
 from labcrane.web.state import SessionLeft, SessionView
 from labcrane_sonification.settings import SonificationSettings

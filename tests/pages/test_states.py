@@ -15,8 +15,8 @@ from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.by import By
 
 from labcrane.core.records import Event
+from labcrane.web.control_room.condition import STATES
 from labcrane.web.handle import PageHandle, free_port
-from labcrane.web.room.condition import STATES
 from labcrane.web.service import PageConfig
 from labcrane.web.state import SessionLeft
 from labcrane.web.translations import WORDS

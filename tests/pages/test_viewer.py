@@ -26,7 +26,7 @@ from labcrane.core.records import Event
 from labcrane.errors import RecordingError
 from labcrane.machines.kinematics import link_frames
 from labcrane.registry.registry import discover
-from labcrane.web.room.shown import ShownShapes
+from labcrane.web.control_room.shown import ShownShapes
 from labcrane.web.viewer.film import POINTS, STEPS, WINDOW_SAMPLES, Film
 from labcrane.web.viewer.glances import Glances
 from labcrane.web.viewer.marks import Marks

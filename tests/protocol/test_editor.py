@@ -197,7 +197,7 @@ def test_mistakes_in_another_file_are_marked_where_the_protocol_names_it(
 def test_the_supervisors_page_asks_what_a_check_asks(
     folder: Path, registry: Registry, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from labcrane.web.room.snapshot import asked as shown
+    from labcrane.web.control_room.snapshot import asked as shown
 
     path, asked = folder / "protocol.yaml", 0
     doubtful = [each for each in faults("aiming", AIMING, 5) if "written as 1e300" in each.fault]

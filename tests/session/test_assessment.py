@@ -9,7 +9,7 @@ from labcrane.analysis.scoring.settings import COUNTS, IndicatorSettings
 from labcrane.core.records import Event
 from labcrane.session.commands import Order
 from labcrane.web.assessment import LIVE, Assessment
-from labcrane.web.door.access import RIGHTS
+from labcrane.web.server.access import RIGHTS
 from labcrane.web.state import SessionView
 
 SETTINGS = IndicatorSettings()

@@ -24,8 +24,8 @@ from labcrane.session.commands import Command, Order
 from labcrane.session.resume import progress, remaining
 from labcrane.session.session import Visit, run
 from labcrane.streams.context import situation_after
-from labcrane.web.room.buttons import buttons
-from labcrane.web.room.condition import state_of
+from labcrane.web.control_room.buttons import buttons
+from labcrane.web.control_room.condition import state_of
 from labcrane.web.state import SessionView
 from labcrane_view.hud import notice, standing
 

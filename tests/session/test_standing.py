@@ -31,8 +31,8 @@ from labcrane.session.commands import (
 from labcrane.session.resume import Ledger
 from labcrane.session.sequencer import Sequencer
 from labcrane.session.standing import ENDED, EXAMINER, STOP, SessionStage, Standing, why_not
-from labcrane.web.room.buttons import buttons
-from labcrane.web.room.condition import state_of
+from labcrane.web.control_room.buttons import buttons
+from labcrane.web.control_room.condition import state_of
 from labcrane.web.state import EARLIER_RULE, SessionView
 
 TRIAL = {"trial": 4, "attempt": 1, "counted": True, "practice": False, "outcome": "success"}

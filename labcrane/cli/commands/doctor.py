@@ -132,7 +132,7 @@ def _examine(
 def _rates(study: "Study | None", before: Sequence["Check"]) -> Iterator["Check"]:
     """Yield the picture rates of the operator's views that can be opened."""
     from labcrane.core.findings import Verdict
-    from labcrane.doctor import apart
+    from labcrane.doctor import check_process
     from labcrane.doctor.report import Check
     from labcrane.feedback.picture_rate import WAIT_S, rate_examinations
 
@@ -142,7 +142,7 @@ def _rates(study: "Study | None", before: Sequence["Check"]) -> Iterator["Check"
         area = f"view {name}"
         if any(each.area == area and each.finding.verdict is Verdict.FAIL for each in before):
             continue  # it cannot be opened, which is said
-        for finding in apart.examine(examination, wait_s=WAIT_S):
+        for finding in check_process.examine(examination, wait_s=WAIT_S):
             yield Check(area, finding)
 
 

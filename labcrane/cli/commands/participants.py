@@ -220,8 +220,8 @@ def study(
 
     if missing := not_installed({"nicegui": LAB}):
         raise PluginError(f"the study's page {missing}")
-    from labcrane.web.door.serving import HOST
     from labcrane.web.handle import free_port
+    from labcrane.web.server.serving import HOST
     from labcrane.web.study.overview import Reader, checked_data
     from labcrane.web.study.service import serve
 

@@ -320,8 +320,8 @@ def view(
     if missing := not_installed({"nicegui": LAB}):
         raise PluginError(f"the viewer {missing}")
     from labcrane.recording.paths import participant_path
-    from labcrane.web.door.serving import HOST
     from labcrane.web.handle import free_port
+    from labcrane.web.server.serving import HOST
     from labcrane.web.viewer.film import Film
     from labcrane.web.viewer.opened import opened
     from labcrane.web.viewer.viewer import serve

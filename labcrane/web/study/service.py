@@ -13,8 +13,8 @@ from labcrane.participants.register import read
 from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.recording.paths import participant_path
 from labcrane.registry.registry import Registry
-from labcrane.web.door.access import STUDY
-from labcrane.web.door.serving import AWAY_S, build_pages, serve_here
+from labcrane.web.server.access import STUDY
+from labcrane.web.server.serving import AWAY_S, build_pages, serve_here
 from labcrane.web.study.overview import Reader, newest_report
 from labcrane.web.study.study_page import page_of
 from labcrane.web.viewer.film import Film

@@ -29,7 +29,7 @@ from labcrane.registry.offers import Offer
 from labcrane.registry.registry import Registry
 from labcrane.streams.context import situation_after
 from labcrane.types import FloatArray
-from labcrane.web.room.sentences import sentence
+from labcrane.web.control_room.sentences import sentence
 from labcrane.web.viewer.glances import Glances
 
 GROUPS = ("loop", "input", "command", "state", "task")

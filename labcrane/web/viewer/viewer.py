@@ -8,12 +8,12 @@ from typing import Any
 from labcrane.errors import LabcraneError, RecordingError
 from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.registry.registry import Registry
-from labcrane.web.door.access import VIEWER
-from labcrane.web.door.serving import AWAY_S, build_pages, serve_here
+from labcrane.web.control_room.model import MachineModel, span
+from labcrane.web.control_room.shown import ShownShapes
 from labcrane.web.page import PRIMARY, see_through, speak
-from labcrane.web.room.model import MachineModel, span
-from labcrane.web.room.shown import ShownShapes
 from labcrane.web.scene import BACKGROUND, CAMERAS
+from labcrane.web.server.access import VIEWER
+from labcrane.web.server.serving import AWAY_S, build_pages, serve_here
 from labcrane.web.surroundings import Surroundings
 from labcrane.web.viewer.film import Film
 from labcrane.web.viewer.glances import Glances
@@ -76,7 +76,7 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
     """Build the page: one machine for each film, side by side at the same second."""
     from nicegui import ui  # noqa: PLC0415
 
-    from labcrane.web.room.element import STYLE  # noqa: PLC0415
+    from labcrane.web.control_room.element import STYLE  # noqa: PLC0415
     from labcrane.web.viewer.element import Timeline  # noqa: PLC0415
 
     first = films[0]

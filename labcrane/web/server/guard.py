@@ -1,6 +1,6 @@
 """Guard of the pages' door: who speaks to whom, how much and how often, before anything is read.
 
-It stands before :class:`labcrane.web.door.access.Gate`, which asks for cookies. Nothing of a body
+It stands before :class:`labcrane.web.server.access.Gate`, which asks for cookies. Nothing of a body
 is kept beyond its limit, and nobody waits longer than :data:`PATIENCE_S` for a slow one.
 """
 
@@ -14,7 +14,7 @@ from starlette.responses import PlainTextResponse
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from labcrane.limits import LIMITS
-from labcrane.web.door.denials import Bucket
+from labcrane.web.server.denials import Bucket
 
 PATIENCE_S = 10.0
 """How long a request, and its body, may take to come."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from labcrane.limits import LIMITS
-from labcrane.web.door.access import AccessKeys, Gate
+from labcrane.web.server.access import AccessKeys, Gate
 
 if TYPE_CHECKING:
     import uvicorn
@@ -26,7 +26,7 @@ def serve_here(app: Any, page: str, port: int, say: Callable[[str], None]) -> No
     """Serve an application whose first page is ``page``; ``say`` is then told its one-time link."""
     import uvicorn  # noqa: PLC0415 - loads for a second
 
-    from labcrane.web.door.guard import BoundedProtocol, Guard  # noqa: PLC0415
+    from labcrane.web.server.guard import BoundedProtocol, Guard  # noqa: PLC0415
 
     keys = AccessKeys({page: secrets.token_urlsafe(24)}, {page: secrets.token_urlsafe(24)})
     link = f"http://{HOST}:{port}/{page}?token={keys.tokens[page]}"

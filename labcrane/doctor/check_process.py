@@ -22,7 +22,7 @@ from labcrane.core.findings import Finding, Verdict
 from labcrane.processes.handle import Patience, ProcessHandle
 from labcrane.processes.parent import Parent
 
-MODULE = "labcrane.doctor.apart"
+MODULE = "labcrane.doctor.check_process"
 
 WAIT_S = 30.0
 """Time limit of an examination."""

@@ -12,13 +12,13 @@ from labcrane.design.counts import TrialCounts
 from labcrane.protocol.questions import about, questions
 from labcrane.protocol.study import Study
 from labcrane.recording.pictures import LOG
+from labcrane.web.control_room.bars import groups
+from labcrane.web.control_room.buttons import answers, buttons
+from labcrane.web.control_room.condition import ExpectedSession, lamp_of, shown_badly, state_of
+from labcrane.web.control_room.earlier import Earlier
+from labcrane.web.control_room.sentences import KINDS, held, sentence
+from labcrane.web.control_room.sliders import sliders
 from labcrane.web.page import PageContext
-from labcrane.web.room.bars import groups
-from labcrane.web.room.buttons import answers, buttons
-from labcrane.web.room.condition import ExpectedSession, lamp_of, shown_badly, state_of
-from labcrane.web.room.earlier import Earlier
-from labcrane.web.room.sentences import KINDS, held, sentence
-from labcrane.web.room.sliders import sliders
 
 NEWEST = 120
 """Events that are listed."""
