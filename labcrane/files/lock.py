@@ -15,6 +15,9 @@ from labcrane.files.atomic import PRIVATE_FILE, make_folder
 LOOK_S = 0.05
 """Interval at which a lock that another process holds is tried again, in seconds."""
 
+REMOVED_S = 2.0
+"""Windows refuses a file that is just being removed; how long it is tried again, in seconds."""
+
 
 @contextmanager
 def exclusive(path: Path) -> Iterator[None]:
@@ -72,16 +75,21 @@ def _opened(path: Path) -> int:
     """
     if path.is_symlink():
         raise RecordingError(NO_LOCK.format(path, "it is a link"))
-    try:
-        fd = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), PRIVATE_FILE)
-    except PermissionError:
-        raise  # on Windows, of a file that is just being removed
-    except OSError as error:
-        raise RecordingError(NO_LOCK.format(path, error.strerror)) from error
-    if not stat.S_ISREG(os.fstat(fd).st_mode):
-        os.close(fd)
-        raise RecordingError(NO_LOCK.format(path, "it is not a file"))
-    return fd
+    deadline = time.monotonic() + (REMOVED_S if sys.platform == "win32" else 0.0)
+    while True:
+        try:
+            fd = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), PRIVATE_FILE)
+        except PermissionError:
+            if time.monotonic() >= deadline:
+                raise
+            time.sleep(LOOK_S / 10.0)
+        except OSError as error:
+            raise RecordingError(NO_LOCK.format(path, error.strerror)) from error
+        else:
+            if stat.S_ISREG(os.fstat(fd).st_mode):
+                return fd
+            os.close(fd)
+            raise RecordingError(NO_LOCK.format(path, "it is not a file"))
 
 
 NO_LOCK = "{} cannot be used as a lock: {}; remove it, then try again"
