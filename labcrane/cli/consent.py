@@ -1,6 +1,5 @@
 """Consent before a session: asked at the terminal, or on the pages."""
 
-import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import typer
 
 from labcrane.cli.commands.approval import today
+from labcrane.cli.typed import from_terminal
 from labcrane.core.records import Event
 from labcrane.session.commands import Command, ConsentGiven, Order, QueueConsole, read_request
 
@@ -78,7 +78,7 @@ def ask_for_consent(visit: "Visit", *, page: bool) -> None:
     Whether the study may be run at all is checked here, before any page is served.
     """
     missing = missing_consent(visit)
-    if missing is None or not sys.stdin.isatty():
+    if missing is None or not from_terminal():
         return
     file, version = missing.text
     other = "; n asks on the participant's page" if page else ""

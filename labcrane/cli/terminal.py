@@ -5,7 +5,6 @@ Both run in threads of their own, so that a slow terminal never makes the loop w
 
 import math
 import re
-import sys
 import threading
 from collections.abc import Mapping
 
@@ -13,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from labcrane.cli.questionnaire import Sheet, Sheets, sheet_line
-from labcrane.cli.typed import lines, next_key, single_keys
+from labcrane.cli.typed import from_terminal, lines, next_key, single_keys
 from labcrane.core.items import AnswerError
 from labcrane.core.records import Event, is_done
 from labcrane.core.roles import Questionnaire
@@ -140,7 +139,7 @@ class Terminal:
                 self._progress.print(line, markup=False, highlight=False)
 
     def _listen(self) -> None:
-        if not sys.stdin.isatty():
+        if not from_terminal():
             for line in lines(self._over):
                 self._line(line)
         else:

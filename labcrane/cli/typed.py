@@ -11,6 +11,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from typing import TextIO
 
 POLL_S = 0.1
 
@@ -25,6 +26,11 @@ def lines(over: threading.Event) -> Iterator[str]:
             yield line.decode(errors="replace").strip()
     if not over.is_set():
         yield text.decode(errors="replace").strip()  # the last one may have no end
+
+
+def from_terminal() -> bool:
+    """Return whether a person types the standard input; Windows calls its NUL a terminal, too."""
+    return sys.stdin.isatty() and _is_console(sys.stdin)
 
 
 def chunks_by_thread(descriptor: int, over: threading.Event) -> Iterator[bytes]:
@@ -51,6 +57,7 @@ def chunks_by_thread(descriptor: int, over: threading.Event) -> Iterator[bytes]:
 
 if sys.platform == "win32":
     import _thread
+    import ctypes
     import msvcrt
 
     _chunks = chunks_by_thread
@@ -59,6 +66,13 @@ if sys.platform == "win32":
     """Prefixes of the number of a key that is not a letter: an arrow, F1."""
 
     INTERRUPT = "\x03"
+
+    def _is_console(stream: TextIO) -> bool:
+        try:
+            handle = msvcrt.get_osfhandle(stream.fileno())
+        except OSError:
+            return True  # a program's own terminal has no handle
+        return bool(ctypes.windll.kernel32.GetConsoleMode(handle, ctypes.byref(ctypes.c_uint32())))
 
     @contextmanager
     def single_keys() -> Iterator[None]:
@@ -87,6 +101,9 @@ else:
     import select
     import termios
     import tty
+
+    def _is_console(stream: TextIO) -> bool:
+        return True
 
     def _chunks(descriptor: int, over: threading.Event) -> Iterator[bytes]:
         """Yield what comes, until the end or until it is over."""

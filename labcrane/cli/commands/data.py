@@ -1,6 +1,5 @@
 """Commands about participants' data: erase, relabel, transfer."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,6 +9,7 @@ from labcrane.cli.commands.approval import today
 from labcrane.cli.commands.participants import Reason, Someone
 from labcrane.cli.options import DataOrHere, StudyFirst, data_in, first_study, one_study
 from labcrane.cli.output import out
+from labcrane.cli.typed import from_terminal
 from labcrane.errors import ProtocolError
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def _confirm_erasure(places: "Places", participant: str) -> None:
     found = inventory(places, participant)
     if not found:  # which erasing refuses
         return
-    if not sys.stdin.isatty():
+    if not from_terminal():
         raise ProtocolError(
             f"erasing {participant} cannot be undone, and there is no terminal at which to ask; "
             f"labcrane where {participant} lists what would go, --yes erases it without asking"

@@ -1,7 +1,6 @@
 """Commands that check the computer before a study day, and report a problem."""
 
 import json
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
@@ -20,6 +19,7 @@ from labcrane.cli.options import (
 )
 from labcrane.cli.output import out
 from labcrane.cli.sync import STYLES
+from labcrane.cli.typed import from_terminal
 from labcrane.errors import LabcraneError, ProtocolError, RecordingError, nearest
 
 if TYPE_CHECKING:
@@ -278,7 +278,7 @@ def _agreed(to: Path) -> bool:
     ProtocolError
         There is no terminal.
     """
-    if not sys.stdin.isatty():
+    if not from_terminal():
         raise ProtocolError(
             "nothing was written: it is shown first, and there is no terminal at which to ask; "
             "--yes writes it without asking, --show NAME prints one of its files"
