@@ -34,6 +34,10 @@ mkdir -p "$packages"
 standard=$(python3.11 -c 'import sysconfig; print(sysconfig.get_path("stdlib"))')
 tar -C "$standard" -c --exclude=lib2to3 --exclude=site-packages --exclude=dist-packages --exclude=__pycache__ \
     --exclude='./config-3*' --exclude=lib-dynload --exclude=./test . | tar -C py/Lib -x
+# The compiled part calls it of the class, as this library does from 3.11.8 on.
+metadata=py/Lib/importlib/metadata/__init__.py
+grep -B1 'def invalidate_caches' $metadata | grep -q classmethod ||
+    sed -i 's/^    def invalidate_caches/    @classmethod\n&/' $metadata
 wheels=(tools/bin/uv pip install -q --target "$packages"
     --python-platform x86_64-pc-windows-msvc --python-version 3.11)
 "${wheels[@]}" --only-binary :all: --extra test -r "$project/pyproject.toml"

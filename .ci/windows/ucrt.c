@@ -1,10 +1,12 @@
-/* What Wine 8 leaves out of ucrtbase: functions of complex numbers (NumPy, SciPy), and the
-   floating-point environment (HDF5).
+/* What Wine 8 leaves out of ucrtbase: functions of complex numbers (NumPy, SciPy), the
+   floating-point environment (HDF5), and the error number of a lock that another file has.
 
    Each is named own_X here and exported as X; build.sh forwards the rest to Wine's. On Windows a long
    double is a double. */
 #include <complex.h>
+#include <errno.h>
 #include <math.h>
+#include <windows.h>
 #include <xmmintrin.h>
 
 typedef struct { double re, im; } Pair;
@@ -80,4 +82,18 @@ int own_feupdateenv(const Environment *environment)
     own_fesetenv(environment);
     _mm_setcsr(_mm_getcsr() | raised);
     return 0;
+}
+
+/* Wine's refuses a lock with -1, as it should, and with whatever error number was there before. */
+int own__locking(int file, int mode, long bytes)
+{
+    HMODULE wine = GetModuleHandleA("ucrtwine.dll");
+    int *(*number)(void) = (int *(*)(void))(void *)GetProcAddress(wine, "_errno");
+    int (*locking)(int, int, long) = (int (*)(int, int, long))(void *)GetProcAddress(wine, "_locking");
+    int refused;
+    *number() = 0;
+    refused = locking(file, mode, bytes);
+    if (refused && !*number())
+        *number() = EACCES;
+    return refused;
 }

@@ -220,4 +220,4 @@ def test_no_word_of_a_table_is_cut_however_narrow_the_terminal(
     print_rows(titles, [("amplifier [left]", "PASS", "500.0", "event-related potentials")])
     said = capsys.readouterr().out
     assert all(word in said for word in (*titles[1:], "amplifier [left]", "potentials"))
-    assert ("┃" in said) == (width == 80)
+    assert any(line in said for line in "┃│") == (width == 80)  # Windows has one of them

@@ -54,7 +54,7 @@ def test_types_are_words_and_columns_stay_where_they_were() -> None:
 
 def test_the_version_tells_what_a_bug_report_needs(capsys: pytest.CaptureFixture[str]) -> None:
     text = said(capsys, "--version")
-    assert re.search(r"^labcrane \d+\.\d+\.\d+ in /", text)
+    assert re.search(r"^labcrane \d+\.\d+\.\d+ in (/|[A-Z]:\\)", text)
     for word in (
         "Python 3.",
         "computer: ",

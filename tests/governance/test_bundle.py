@@ -210,6 +210,7 @@ def test_a_bundle_with_more_or_less_in_it_than_was_packed_is_not_installed(
     assert not (tmp_path / "there").exists()
 
 
+@needs("links")
 def test_a_link_in_a_bundle_is_refused(tmp_path: Path) -> None:
     folder = packed(tmp_path / "stick")
     (folder / "study" / "more.py").symlink_to("plugins/own.py")

@@ -230,6 +230,7 @@ def test_permissions_behind_links_stay_and_dangling_ones_do_not_matter(lab: Lab)
 
 
 @pytest.mark.slow
+@needs("links")
 def test_erasing_removes_links_and_never_what_is_behind_them(lab: Lab) -> None:
     folder = outside(lab)
     raw = lab.places.raw("P007")
@@ -242,6 +243,7 @@ def test_erasing_removes_links_and_never_what_is_behind_them(lab: Lab) -> None:
     assert mentions(lab.places, "P007") == ([], [])
 
 
+@needs("links")
 def test_a_link_in_the_place_of_a_recording_is_told_and_due_until_it_is_gone(lab: Lab) -> None:
     raw = lab.places.raw("P007")
     moved = lab.folder / "P007 moved"
@@ -259,6 +261,7 @@ def test_a_link_in_the_place_of_a_recording_is_told_and_due_until_it_is_gone(lab
     assert read(lab.places).owed == []
 
 
+@needs("links")
 def test_no_session_is_recorded_behind_a_link(tmp_path: Path) -> None:
     study = a_study(tmp_path)
     (tmp_path / "elsewhere").mkdir()
@@ -270,6 +273,7 @@ def test_no_session_is_recorded_behind_a_link(tmp_path: Path) -> None:
         DataFolder(tmp_path, "P001", pilot=False, simulated=False).make()
 
 
+@needs("links")
 def test_transfer_follows_no_links(lab: Lab) -> None:
     (lab.places.raw("P001") / "notes.txt").symlink_to(outside(lab) / "P007.txt")
     done = recovery.move(lab.places, store_of(lab))

@@ -1,6 +1,7 @@
 """A problem report has what explains a fault, and nothing of people in any of its bytes."""
 
 import json
+import os
 import platform
 import random
 import shutil
@@ -205,7 +206,7 @@ def test_without_a_terminal_nothing_is_written_unless_yes_is_said(
     assert "there is no terminal at which to ask; --yes writes it" in capsys.readouterr().err
     assert not archive.exists()
     report("--yes")
-    assert archive.stat().st_mode & 0o077 == 0
+    assert os.name != "posix" or archive.stat().st_mode & 0o077 == 0
     assert planted_in(archive) == []
     assert "no joystick" in file_of(archive, "doctor.json")
 

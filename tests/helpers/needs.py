@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterable
 from functools import cache
 from importlib.util import find_spec
@@ -84,6 +85,16 @@ def node_module(name: str) -> Path | None:
     return next((Path(each, name) for each in folders if each and Path(each, name).is_dir()), None)
 
 
+def _makes_links() -> bool:
+    with tempfile.TemporaryDirectory() as folder:
+        link = Path(folder, "link")
+        try:
+            link.symlink_to(folder, target_is_directory=True)
+        except OSError:
+            return False
+        return link.is_symlink()
+
+
 def _may_run_in_real_time() -> bool:
     asked = "import os; os.sched_setscheduler(0, os.SCHED_FIFO, "
     asked += f"os.sched_param({REAL_TIME_PRIORITY}))"
@@ -113,6 +124,8 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
     ),
     "/dev/shm": (lambda: Path("/dev/shm").is_dir(), "mount a tmpfs there"),
     "real-time priorities": (_may_run_in_real_time, "docs/lab.md says how a user is allowed them"),
+    "links": (_makes_links, "Windows has them for administrators, Wine has none for Python"),
+    "named pipes": (lambda: hasattr(os, "mkfifo"), "Windows has others"),
     "fork": (lambda: hasattr(os, "fork"), "Windows has none"),
     "terminals": (lambda: find_spec("pty") is not None, "Windows has no pseudo-terminals"),
     "limits of files": (lambda: find_spec("resource") is not None, "Windows has none"),

@@ -87,7 +87,7 @@ def test_a_session_that_takes_nothing_keeps_nobody_waiting(
     assert said.get() == f"the session takes no messages; {MOST_WAITING} wait, and one was dropped"
     session.kill()
     assert session.ended
-    assert session.close() == -9
+    assert session.close() == (-9 if os.name == "posix" else 1)
 
 
 HALF = """

@@ -173,7 +173,7 @@ def test_a_scene_that_the_dynamics_has_not_is_told(told) -> None:
         ("gripper", "griper", "10:118: {}: there is no link 'griper'; did you mean 'gripper'? it has base,"),
         ("{elbow: 60}", "{elbo: 60}", "10:144: rest_deg names 'elbo'; did you mean 'elbow'? its joints are slew,"),
         ("{elbow: 60}", "{elbow: 600}", "10:145: {} as a machine: joint 'elbow': rest_deg 600 is outside the joint's range; it must be -54 to 79.2"),
-        ("_x.urdf", "_y.urdf", "10:17: machine file '{}' does not exist; paths are relative to"),
+        ("_x.urdf", "_y.urdf", "10:17: machine file {!r} does not exist; paths are relative to"),
     ],
 )  # fmt: skip
 def test_a_wrong_name_of_a_robots_file_is_told_where_the_protocol_has_it(
@@ -191,7 +191,7 @@ def test_a_wrong_name_of_a_robots_file_is_told_where_the_protocol_has_it(
     assert told("aiming", right) == []
     (line,) = told("aiming", right.replace(old, new, 1))
     file = folder / ("openmanipulator_y.urdf" if "_y" in new else "openmanipulator_x.urdf")
-    assert line.startswith(said.format(file)), line
+    assert line.startswith(said.format(str(file))), line
 
 
 NEAR = "[0.1], width: 0.02, centre: [0.2, 0, 0.1]"

@@ -7,6 +7,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from needs import needs
 from recording.journals import COLUMNS, CONTEXT, frames, stamp, write
 
 from labcrane import RecordingError
@@ -270,6 +271,7 @@ def test_recover_finds_what_is_missing_and_leaves_the_rest_alone(tmp_path: Path)
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.h5")} == files
 
 
+@needs("links")
 def test_a_participants_folder_may_be_a_link_to_another_disk(tmp_path: Path) -> None:
     (tmp_path / "disk-7").mkdir()
     folder = tmp_path / "P001"

@@ -50,4 +50,6 @@ def table(text: str, marker: str = "|") -> dict[str, list[str]]:
 
 def under(folder: Path) -> list[str]:
     """Return all files below a folder, by their paths in it."""
-    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+    return sorted(
+        path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()
+    )
