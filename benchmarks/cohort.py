@@ -7,12 +7,15 @@ makes a fifth of its ticks: four motors set, one step, four joints read. It runs
 settings that a crane needs by itself (200 solver passes, no residual threshold, limits of
 1e7 N m), and with the 400 passes of labcrane's crane. Times of one core are the process's own.
 
-The crane study is simulated by the command, with two workers and all start-up. Its 15 s on two idle
-cores are 30 s of the processor, and those 0.35 of what bare ticks take where 36 us is one. For
-power, cohorts of two sizes are sampled from a pool; the time of one more gives that of a thousand.
+The crane study is simulated by the command, with two workers and all start-up. Two processes at
+once may slow each other down, on cores of two threads each. Therefore a bare pair of them is
+measured too, and the references for two workers grow by as much. For power, cohorts of two sizes
+are sampled from a pool; the time of one more gives that of a thousand.
 """
 
 import argparse
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -40,8 +43,11 @@ SAMPLE = 100_000
 PILOT_TIMES = 0.35
 """What the crane study's 36 may take beside bare ticks."""
 
-FEW_TIMES, MANY_TIMES = 1.6, 1.8
-"""How much faster two workers are than one; of few participants each loads libraries for long."""
+FEW_TIMES, MANY_TIMES = 1.25, 1.15
+"""What two workers may take beside what two bare processes need of the time of one after the
+other, which is half on two whole cores; with few participants each loads libraries for long."""
+
+BARE = [sys.executable, "-c", "sum(i * i for i in range(20_000_000))"]
 
 COHORTS, FEW, MORE = 1000, 20, 120
 POWER_S = 600.0
@@ -162,10 +168,25 @@ def two_cores_and_memory(folder: Path, few: int) -> Iterator[Row]:
     alone = {count: command(folder, count, 1) for count in (few, many)}
     for count, times in ((few, FEW_TIMES), (many, MANY_TIMES)):
         what = f"{count} participants with two workers, s"
-        two = command(folder, count, 2).seconds
-        yield Row("cohort", what, two, alone[count].seconds, "with one", 1.0 / times)
+        two, share = command(folder, count, 2).seconds, share_at_once()
+        bare = "with one, by what two bare processes at once need of one after the other"
+        yield Row("cohort", what, two, share * alone[count].seconds, bare, times)
     small, large = (alone[count].megabytes for count in (few, many))
     yield Row("cohort", f"{many} participants, MB at most", large, small, f"{few} of them", 1.1)
+
+
+def share_at_once() -> float:
+    """Return what two bare processes at once need of the time that they need in turn."""
+
+    def took(at_once: int) -> float:
+        began = time.perf_counter()
+        running = [subprocess.Popen(BARE) for _ in range(at_once)]
+        if any(each.wait() for each in running):
+            raise OSError("a bare process failed")
+        return time.perf_counter() - began
+
+    in_turn = took(1) + took(1)
+    return took(2) / in_turn
 
 
 def pilot(folder: Path, participants: int) -> Row:
@@ -174,9 +195,11 @@ def pilot(folder: Path, participants: int) -> Row:
     words = ("--participants", str(participants), "--workers", "2")
     ours = spent_s("simulate", str(CRANE_PILOT), "--out", str(data), *words)
     ticks = sum(map(recorded, data.glob("*/*.h5")))
-    bare = bare_s(study, PASSES[0], SAMPLE) * ticks / SAMPLE
+    bare = bare_s(study, PASSES[0], SAMPLE) * ticks / SAMPLE * 2.0 * share_at_once()
     what = f"crane_pilot, {participants} participants, two workers, processor's s with start-up"
-    return Row("cohort", what, ours, bare, f"bare PyBullet, {ticks} ticks", PILOT_TIMES)
+    return Row(
+        "cohort", what, ours, bare, f"bare PyBullet, {ticks} ticks, two at once", PILOT_TIMES
+    )
 
 
 def power(folder: Path, size: int, more: int) -> Iterator[Row]:
