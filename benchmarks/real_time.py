@@ -22,8 +22,11 @@ from labcrane.core.clock import SystemClock
 from labcrane.doctor.scheduling import lateness
 from labcrane.streams.network import LOOPBACK
 
-SECONDS = 60.0
-ALONE_S = 10.0
+SECONDS, ALONE_S = 40.0, 30.0
+FEW = 3.0
+"""How many times more late ticks than the empty loop's are allowed, with one added to each: the
+host of a virtual computer takes its cores from it now and then, for longer than a tick."""
+
 PERIOD_MS = 1e3 / RATE_HZ
 QUANTILES = {"50 %": 0.5, "99 %": 0.99, "99.9 %": 0.999, "all": 1.0}
 PROMISED = ("99 %", "99.9 %")
@@ -78,7 +81,7 @@ def measure(folder: Path, seconds: float) -> list[Row]:
             "real time", "ticks late by a period or more, a laboratory beside, and one",
             1.0 + float(np.sum(late["P002"] > PERIOD_MS)),
             1.0 + float(np.mean(alone > PERIOD_MS)) * len(late["P002"]),
-            "of an empty loop, and one", 1.0,
+            "of an empty loop, and one", FEW,
         ),
     ]  # fmt: skip
 
