@@ -89,12 +89,8 @@ FEWEST = 40
 """Columns that a session of the study has at least."""
 
 COMMANDS = (("report",), ("export", "--to", "tables"))
-REPORT_TIMES = 4.0
-"""What a report may take per participant after the first, beside the same."""
-
-EXPORT_TIMES = 10.0
-"""What an export may take beside writing the same columns without labcrane."""
-
+REPORT_TIMES, EXPORT_TIMES = 4.0, 10.0
+"""What report and export may take beside writing the same columns without labcrane."""
 
 PARTICIPANTS = 9
 

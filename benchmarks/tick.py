@@ -51,7 +51,7 @@ FEW = 0.01
 """Share of late ticks up to which a rate is held."""
 
 LIMITS = {"whole": ("bare", 1.5, 2.5), "whole, LSL": ("bare, LSL", 1.5, 2.0)}
-"""Which bare tick stands beside it, and how much longer it may take: the median, 99 % of ticks."""
+"""The bare tick that is compared, and how much longer a whole one may take: median and 99 %."""
 
 SLOWEST = 2.0
 """How much lower the highest rate held may be than that of a loop that does nothing."""
