@@ -2,7 +2,7 @@
 
     python -m benchmarks.cohort [--participants 36]
 
-Every participant of the aiming study is simulated and consolidated. After each, the engine alone
+Participants of the aiming study are simulated and consolidated. After each, the engine alone
 makes a fifth of its ticks: four motors set, one step, four joints read. It runs with the
 settings that a crane needs by itself (200 solver passes, no residual threshold, limits of
 1e7 N m), and with the 400 passes of labcrane's crane. Times of one core are the process's own.
@@ -63,11 +63,14 @@ def rows(*, brief: bool = False) -> list[Row]:
 
 
 def rows_of(participants: int, more: int = MORE) -> list[Row]:
-    """Return all figures of so many; of power, from cohorts of two numbers, ``FEW`` and more."""
+    """Return all figures of so many; of power, from cohorts of two numbers, ``FEW`` and more.
+
+    A third of the participants are compared tick by tick, and half with all of them.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        found = one_core(folder, participants)
-        found += two_cores_and_memory(folder, participants)
+        found = one_core(folder, participants // 3)
+        found += two_cores_and_memory(folder, participants // 2, participants)
         found.append(pilot(folder, participants))
         found += power(folder, participants, more)
     return found
@@ -162,9 +165,8 @@ def command(folder: Path, participants: int, workers: int) -> Use:
     return used(*words, "--participants", str(participants), "--workers", str(workers))
 
 
-def two_cores_and_memory(folder: Path, few: int) -> Iterator[Row]:
-    """Compare two workers with one, and the memory for few participants and twice as many."""
-    many = 2 * few
+def two_cores_and_memory(folder: Path, few: int, many: int) -> Iterator[Row]:
+    """Compare two workers with one, and the memory for few participants and for many."""
     alone = {count: command(folder, count, 1) for count in (few, many)}
     for count, times in ((few, FEW_TIMES), (many, MANY_TIMES)):
         what = f"{count} participants with two workers, s"
