@@ -24,14 +24,13 @@ export default {
           @change="ask(at)"><option value="curve">curve</option><option value="spectrogram">spectrogram</option>
         </select></label></div>
         <div v-show="chart.as === 'spectrogram' && chart.signal !== ''" class="view-spectrum">
-          <canvas :id="'spectrum-' + at" width="300" height="128" role="img"
+          <div class="view-plot"><canvas :id="'spectrum-' + at" width="300" height="128" role="img"
             :aria-label="'spectrogram of signal ' + (at + 1)" @click="into($event, chart)"></canvas>
-          <svg class="view-over" viewBox="0 0 600 110" preserveAspectRatio="none" aria-hidden="true">
-            <line class="view-now" :x1="place(t, chart)" :x2="place(t, chart)" y1="0" y2="110"/></svg>
+            <span class="view-now" aria-hidden="true" :style="now(chart)"></span></div>
           <p class="room-faint" :id="'heard-' + at">{{ chart.heard }}</p></div>
-        <svg v-if="chart.path" class="room-chart" viewBox="0 0 600 110" preserveAspectRatio="none" role="img"
-          :aria-label="'signal ' + (at + 1)" @click="into($event, chart)"><path class="room-late" :d="chart.path"/>
-          <line class="view-now" :x1="place(t, chart)" :x2="place(t, chart)" y1="0" y2="110"/></svg>
+        <div v-if="chart.path" class="view-plot"><svg class="room-chart" viewBox="0 0 600 110" preserveAspectRatio="none" role="img"
+          :aria-label="'signal ' + (at + 1)" @click="into($event, chart)"><path class="room-late" :d="chart.path"/></svg>
+          <span class="view-now" aria-hidden="true" :style="now(chart)"></span></div>
         <p v-if="chart.path" class="room-faint" :id="'range-' + at"><strong :id="'value-' + at">{{ reading(chart) }}</strong> now · {{ chart.said }}</p>
       </div>
     </section>
@@ -51,14 +50,14 @@ export default {
     </div>
     <input type="range" id="scrub" class="view-scrub" aria-label="Time in seconds" min="0" :max="about.length" step="0.01"
       :value="t" :aria-valuetext="clock(t)" @input="go(Number($event.target.value))">
-    <svg class="view-line" viewBox="0 0 600 46" preserveAspectRatio="none" role="img"
+    <div class="view-plot"><svg class="view-line" viewBox="0 0 600 46" preserveAspectRatio="none" role="img"
       :aria-label="about.trials.length + ' trials and ' + about.events.length + ' events'" @click="into($event)">
       <rect v-for="(one, n) in spans" :key="n" :class="one.kind" :x="one.x" :width="one.width" y="2" height="20"/>
       <rect v-for="(one, n) in holes" :key="'g' + n" class="view-gap" :x="one.x" :width="one.width" y="0" height="46"/>
       <path class="view-ticks" :d="ticks"/>
       <rect v-for="(one, n) in breaks" :key="'b' + n" :class="'view-' + one.kind" :x="one.x" :width="one.width" :y="one.kind === 'lost' ? 35 : 40" height="5"><title>{{ one.text }}</title></rect>
-      <rect v-for="(one, n) in marksHere" :key="'m' + n" class="view-mark" :x="one.x" :width="one.width" y="22" height="8"><title>{{ one.text }}</title></rect>
-      <line class="view-now" :x1="place(t)" :x2="place(t)" y1="0" y2="46"/></svg>
+      <rect v-for="(one, n) in marksHere" :key="'m' + n" class="view-mark" :x="one.x" :width="one.width" y="22" height="8"><title>{{ one.text }}</title></rect></svg>
+      <span class="view-now" aria-hidden="true" :style="now()"></span></div>
     <p class="room-faint view-legend"><span class="view-swatch success"></span>success
       <span class="view-swatch other"></span>other end <span class="view-swatch approach"></span>not counted
       <span class="view-swatch gap"></span>no frames <span class="view-swatch paused"></span>paused
@@ -71,9 +70,9 @@ export default {
       <g v-for="a in glance.areas" :key="a.name"><rect :class="{ looked: a.name === glance.looked }" :x="a.box[0]" :y="a.box[1]" :width="a.box[2] - a.box[0]" :height="a.box[3] - a.box[1]"><title>{{ a.name }}</title></rect></g>
       <polyline v-if="glance.trail.length > 1" :points="glance.trail.join(' ')"/>
       <circle v-if="glance.trail.length" :cx="glance.trail.at(-1)[0]" :cy="glance.trail.at(-1)[1]" :r="extent.width / 80"/></svg>
-    <svg class="view-lane" viewBox="0 0 600 20" preserveAspectRatio="none" role="img" aria-label="areas looked at over time" @click="into($event, lane)">
-      <rect v-for="(one, n) in lookedAt" :key="n" :fill="one.colour" :x="one.x" :width="one.width" y="0" height="20"><title>{{ one.name }}</title></rect>
-      <line class="view-now" :x1="place(t, lane)" :x2="place(t, lane)" y1="0" y2="20"/></svg>
+    <div class="view-plot"><svg class="view-lane" viewBox="0 0 600 20" preserveAspectRatio="none" role="img" aria-label="areas looked at over time" @click="into($event, lane)">
+      <rect v-for="(one, n) in lookedAt" :key="n" :fill="one.colour" :x="one.x" :width="one.width" y="0" height="20"><title>{{ one.name }}</title></rect></svg>
+      <span class="view-now" aria-hidden="true" :style="now(lane)"></span></div>
     <p class="room-faint view-legend"><template v-for="(name, n) in areaNames" :key="name"><span class="view-swatch" :style="{ background: colour(n) }"></span>{{ name }}</template></p>
   </section>
   <section v-if="about.marking" class="room-card"><h2>Annotations</h2>
@@ -162,6 +161,7 @@ export default {
   beforeUnmount() { removeEventListener("keydown", this.key); clearInterval(this.timer); clearInterval(this.asking); },
   methods: {
     place(t, { begin, end } = this) { return 600 * (t - begin) / Math.max(1e-9, end - begin); },
+    now(shown) { return { transform: `translateX(${this.place(this.t, shown) / 6}%)` }; }, // moved over a curve, which is not painted again
     question(key, about) { // one of a key at a time: the newest is asked when the one before is answered
       const asked = { key, ident: ++this.asked, ...about };
       if (this.open[key]) { this.next[key] = asked; return; }
