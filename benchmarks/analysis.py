@@ -89,7 +89,7 @@ FEWEST = 40
 """Columns that a session of the study has at least."""
 
 COMMANDS = (("report",), ("export", "--to", "tables"))
-REPORT_TIMES, EXPORT_TIMES = 4.0, 10.0
+REPORT_TIMES, EXPORT_TIMES = 5.0, 10.0
 """What report and export may take beside writing the same columns without labcrane."""
 
 PARTICIPANTS = 9

@@ -28,7 +28,7 @@ QUARTER_MS = 250.0 / RATE_HZ
 SPELL_S, SPELLS, RECONNECTS = 0.7, 10, 20
 """How long a spell is, how many of each kind there are, and the connections in one."""
 
-SECONDS, BRIEF_S = 40, 5
+SECONDS, BRIEF_S = 30, 5
 PERIOD_S = 1024 / 48000
 
 

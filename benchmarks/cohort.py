@@ -7,19 +7,19 @@ makes a fifth of its ticks: four motors set, one step, four joints read. It runs
 settings that a crane needs by itself (200 solver passes, no residual threshold, limits of
 1e7 N m), and with the 400 passes of labcrane's crane. Times of one core are the process's own.
 
-The crane study is simulated by the command, with two workers and all start-up. Two processes at
-once may slow each other down, on cores of two threads each. Therefore a bare pair of them is
-measured too, and the references for two workers grow by as much. For power, cohorts of two sizes
-are sampled from a pool; the time of one more gives that of a thousand.
+Two processes at once slow each other down: they share caches and, on many computers, cores. Two
+workers of one command are therefore compared with two commands at once, which share the
+participants, and those of the crane study with two bare engines at once. For power, cohorts of two
+sizes are sampled from a pool; the time of one more gives that of a thousand.
 """
 
 import argparse
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
+from multiprocessing import get_context
 from pathlib import Path
 
 from benchmarks.bare_engine import BareEngine
@@ -40,14 +40,11 @@ PART = 5
 SAMPLE = 100_000
 """Number of bare ticks from which the time of a cohort's ticks is extrapolated."""
 
-PILOT_TIMES = 0.35
+PILOT_TIMES = 0.5
 """What the crane study's 36 may take beside bare ticks."""
 
-FEW_TIMES, MANY_TIMES = 1.25, 1.15
-"""What two workers may take beside what two bare processes need of the time of one after the
-other, which is half on two whole cores; with few participants each loads libraries for long."""
-
-BARE = [sys.executable, "-c", "sum(i * i for i in range(20_000_000))"]
+TWO_TIMES = 1.25
+"""What two workers may take beside two commands at once, with half of the participants each."""
 
 COHORTS, FEW, MORE = 1000, 20, 120
 POWER_S = 600.0
@@ -161,47 +158,40 @@ def bare_s(study: Study, passes: int, count: int) -> float:
 
 def command(folder: Path, participants: int, workers: int) -> Use:
     """Run ``labcrane simulate`` in a process of its own; return what it used."""
-    words = ["simulate", str(AIMING), "--out", str(folder / f"out-{participants}-{workers}")]
+    words = ["simulate", str(AIMING), "--out", str(folder)]
     return used(*words, "--participants", str(participants), "--workers", str(workers))
 
 
 def two_cores_and_memory(folder: Path, few: int, many: int) -> Iterator[Row]:
-    """Compare two workers with one, and the memory for few participants and for many."""
-    alone = {count: command(folder, count, 1) for count in (few, many)}
-    for count, times in ((few, FEW_TIMES), (many, MANY_TIMES)):
-        what = f"{count} participants with two workers, s"
-        two, share = command(folder, count, 2).seconds, share_at_once()
-        bare = "with one, by what two bare processes at once need of one after the other"
-        yield Row("cohort", what, two, share * alone[count].seconds, bare, times)
-    small, large = (alone[count].megabytes for count in (few, many))
+    """Compare two workers with two commands, and the memory for few participants and for many."""
+    two = command(folder / "two", many, 2).seconds
+    with ThreadPoolExecutor(2) as pool:
+        halves = list(pool.map(lambda name: command(folder / name, few, 1), ("one", "other")))
+    large = command(folder / "whole", many, 1).megabytes
+    what = f"{many} participants with two workers, s"
+    apart = max(each.seconds for each in halves)
+    yield Row("cohort", what, two, apart, f"two commands at once, {few} each", TWO_TIMES)
+    small = halves[0].megabytes
     yield Row("cohort", f"{many} participants, MB at most", large, small, f"{few} of them", 1.1)
-
-
-def share_at_once() -> float:
-    """Return what two bare processes at once need of the time that they need in turn."""
-
-    def took(at_once: int) -> float:
-        began = time.perf_counter()
-        running = [subprocess.Popen(BARE) for _ in range(at_once)]
-        if any(each.wait() for each in running):
-            raise OSError("a bare process failed")
-        return time.perf_counter() - began
-
-    in_turn = took(1) + took(1)
-    return took(2) / in_turn
 
 
 def pilot(folder: Path, participants: int) -> Row:
     """Simulate the crane study as people do, with two workers."""
-    data, study = folder / "pilot", load(CRANE_PILOT, discover())
+    data = folder / "pilot"
     words = ("--participants", str(participants), "--workers", "2")
     ours = spent_s("simulate", str(CRANE_PILOT), "--out", str(data), *words)
     ticks = sum(map(recorded, data.glob("*/*.h5")))
-    bare = bare_s(study, PASSES[0], SAMPLE) * ticks / SAMPLE * 2.0 * share_at_once()
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+        bare = sum(pool.map(bare_sample_s, (CRANE_PILOT,) * 2)) / 2.0 * ticks / SAMPLE
     what = f"crane_pilot, {participants} participants, two workers, processor's s with start-up"
     return Row(
         "cohort", what, ours, bare, f"bare PyBullet, {ticks} ticks, two at once", PILOT_TIMES
     )
+
+
+def bare_sample_s(protocol: Path) -> float:
+    """Return the processor's seconds for ``SAMPLE`` ticks of the engine of a study alone."""
+    return bare_s(load(protocol, discover()), PASSES[0], SAMPLE)
 
 
 def power(folder: Path, size: int, more: int) -> Iterator[Row]:

@@ -22,7 +22,7 @@ from labcrane.core.clock import SystemClock
 from labcrane.doctor.scheduling import lateness
 from labcrane.streams.network import LOOPBACK
 
-SECONDS, ALONE_S = 40.0, 30.0
+SECONDS, ALONE_S = 30.0, 30.0
 FEW = 3.0
 """How many times more late ticks than the empty loop's are allowed, with one added to each: the
 host of a virtual computer takes its cores from it now and then, for longer than a tick."""

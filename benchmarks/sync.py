@@ -44,7 +44,7 @@ HEAD = (
     "| device or clock | error, 95 % (worst) | stated, median | covered, least | pyxdf | PASS |",
     "|---|---|---|---|---|---|",
 )
-SHORT = ("--seconds", "80", "--restarts", "2", "--draws", "2")
+SHORT = ("--seconds", "60", "--restarts", "2", "--draws", "2")
 INSTANT = ("--seconds", "10", "--restarts", "1", "--draws", "1")
 
 
@@ -70,7 +70,7 @@ BUSY = (Case("100 ppm, both cores busy", 0.02), Case("chunks, both cores busy", 
 
 
 def rows(*, brief: bool = False) -> list[Row]:
-    """Return the rows of misbehaving devices, of each case and of restarts; takes four minutes."""
+    """Return the rows of misbehaving devices, of each case and of restarts; takes three minutes."""
     # In a separate process, because liblsl reads its network settings once, when it is loaded.
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.sync", *(INSTANT if brief else SHORT), "--json"],

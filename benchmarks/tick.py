@@ -46,11 +46,11 @@ WARM_UP = 200
 RATES_HZ = (*(round(240 * 1.2**step) for step in range(12)), 2000)
 """A session's rate, and on in steps of a fifth up to the highest that a protocol may ask for."""
 
-PACED_S = 4.0
+PACED_S = 3.0
 FEW = 0.01
 """Share of late ticks up to which a rate is held."""
 
-LIMITS = {"whole": ("bare", 1.5, 2.5), "whole, LSL": ("bare, LSL", 1.5, 2.0)}
+LIMITS = {"whole": ("bare", 1.5, 2.5), "whole, LSL": ("bare, LSL", 1.8, 2.0)}
 """The bare tick that is compared, and how much longer a whole one may take: median and 99 %."""
 
 SLOWEST = 2.0
