@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
+from second_try import without_group
 
 BEGAN = "LABCRANE_TESTS_BEGAN"
 """When a run began, by the clock that its processes share."""
@@ -80,9 +81,8 @@ class Parts:
             return
         self._passed += 1
         if self._path is not None:
-            nodeid = report.nodeid.partition("@")[0]  # which xdist appends a group to
             with self._path.open("a", encoding="utf-8") as file:
-                file.write(f"{_commit()} {nodeid}\n")
+                file.write(f"{_commit()} {without_group(report.nodeid)}\n")
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         """Say how far it has come."""

@@ -84,7 +84,7 @@ class SecondTry:
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Count what ends, and keep what failed in any of its phases."""
-        name = report.nodeid.partition("@")[0]  # which xdist appends a group to
+        name = without_group(report.nodeid)
         self._seconds[name] = self._seconds.get(name, 0.0) + report.duration
         if {"slow", "long", "soak"} & set(report.keywords):
             self._slow.add(name)
@@ -152,6 +152,12 @@ class SecondTry:
         terminalreporter.line(f"{used:.0f} s of processor{more}")
         for says in self._says:
             terminalreporter.line(says)
+
+
+def without_group(nodeid: str) -> str:
+    """Return a test's name without the group that xdist appends; a parameter may have an @, too."""
+    name, at, group = nodeid.rpartition("@")
+    return nodeid if not at or group.endswith("]") else name
 
 
 def chosen(config: pytest.Config) -> str:

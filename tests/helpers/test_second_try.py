@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from second_try import QUICK
+from second_try import QUICK, without_group
 
 TESTS = """
 from pathlib import Path
@@ -120,3 +120,16 @@ def test_what_passed_in_one_stage_is_not_run_in_the_next(tmp_path: Path, process
     status, _, noted = gate_in(tmp_path, processes=processes)
     assert (status, noted["passed"]) == (0, 2)
     assert sorted(path.name for path in tmp_path.glob("tried-*")) == ["tried-2", "tried-5"]
+
+
+@pytest.mark.parametrize(
+    ("nodeid", "name"),
+    [
+        ("tests/test_a.py::test_b", "tests/test_a.py::test_b"),
+        ("tests/test_a.py::test_b@tests/test_a.py", "tests/test_a.py::test_b"),
+        ("tests/test_a.py::test_b[x@y]", "tests/test_a.py::test_b[x@y]"),
+        ("tests/test_a.py::test_b[x@y]@group", "tests/test_a.py::test_b[x@y]"),
+    ],
+)
+def test_a_name_keeps_its_own_at_sign_and_loses_that_of_its_group(nodeid: str, name: str) -> None:
+    assert without_group(nodeid) == name
