@@ -65,6 +65,10 @@ Of the quick tests fewer do, and each process imports and collects all of them: 
 """
 
 
+LONG_S = 1800
+"""How long a test marked ``long`` may take, in s: busy computers need a multiple of the minutes."""
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     add_options(parser)
 
@@ -107,6 +111,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Keep the tests of a file in one process, which makes their fixtures once."""
     leave_out_passed(config, items)
     for item in items:
+        if item.get_closest_marker("long") and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(LONG_S))
         if item.get_closest_marker("xdist_group") is None and _shares(item):
             item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
 
