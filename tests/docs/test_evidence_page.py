@@ -5,26 +5,14 @@ import os
 import re
 import subprocess
 import tomllib
-from importlib.machinery import SourceFileLoader
-from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
 from docs.page import ROOT
+from gate_program import gate_program
 
-
-def load() -> ModuleType:
-    loader = SourceFileLoader("evidence", str(ROOT / ".ci" / "evidence"))
-    spec = spec_from_loader("evidence", loader)
-    assert spec
-    module = module_from_spec(spec)
-    loader.exec_module(module)
-    return module
-
-
-EVIDENCE = load()
+EVIDENCE = gate_program("evidence")
 RECORD = json.loads((ROOT / EVIDENCE.DATA).read_text(encoding="utf-8"))
 NOTHING: dict[str, Any] = {
     "stages": {},
