@@ -20,7 +20,7 @@ from leavings import watch
 from left_out import leave_out, look_again, nothing_to_find
 from needs import need, not_tried
 from once import RUN_FOLDER
-from parts import Parts, add_options, asked_for
+from parts import NAME, Parts, add_options, asked_for
 from port_block import claim
 from second_try import GATE, PASSED, QUICK, SecondTry, leave_out_passed
 
@@ -79,7 +79,7 @@ def pytest_configure(config: pytest.Config) -> None:
         if sys.platform != "win32":
             watch()
     if asked_for(config):
-        config.pluginmanager.register(Parts(config))
+        config.pluginmanager.register(Parts(config), NAME)
     if GATE in os.environ and not hasattr(config, "workerinput"):
         passed = Path(os.environ[PASSED]) if PASSED in os.environ else None
         config.pluginmanager.register(SecondTry(config, Path(os.environ.pop(GATE)), passed))

@@ -38,7 +38,7 @@ def rows(table: str, system: str) -> list[list[str]]:
 def after(folder: Path, stage: str, *runs: dict[str, Any], ending: str = "passed") -> Any:
     path = folder / "runs"
     path.write_text("".join(json.dumps(run) + "\n" for run in runs), encoding="utf-8")
-    return EVIDENCE.kept(NOTHING, stage, ending, "12", path, "abc1234")
+    return EVIDENCE.kept(NOTHING, stage, ending, ("12", "5"), path, "abc1234")
 
 
 def test_the_pages_are_those_of_the_record() -> None:
@@ -80,7 +80,7 @@ def test_a_run_on_any_python_of_a_system_replaces_the_row_that_says_there_was_no
 def test_a_newer_run_of_a_stage_takes_the_place_of_the_older_one(tmp_path: Path) -> None:
     old = after(tmp_path, "pythons", RUN, RUN | {"python": "3.12.1"})
     (tmp_path / "runs").write_text(json.dumps(RUN | {"passed": 9}) + "\n", encoding="utf-8")
-    new = EVIDENCE.kept(old, "pythons", "passed", "1", tmp_path / "runs", "abc1234")
+    new = EVIDENCE.kept(old, "pythons", "passed", ("1", "1"), tmp_path / "runs", "abc1234")
     assert [(one["python"], one["passed"]) for one in new["systems"]] == [("3.12", 7), ("3.14", 9)]
 
 
@@ -134,7 +134,7 @@ def test_a_python_that_is_not_there_is_noted_as_not_tried_with_the_reason(tmp_pa
     assert (done.returncode, done.stderr) == (0, "")
     (line,) = EVIDENCE.lines_of(runs)
     assert line["untried"] == "this computer has no Python 3.99"
-    record = EVIDENCE.kept(NOTHING, "pythons", "passed", "1", runs, "abc1234")
+    record = EVIDENCE.kept(NOTHING, "pythons", "passed", ("1", "1"), runs, "abc1234")
     why = "not tried: this computer has no Python 3.99"
     assert record["stages"]["pythons"]["ended"] == why
     (row,) = (row for row in rows(EVIDENCE.systems_table(record), "Linux") if row[0] == "3.99")
@@ -162,6 +162,45 @@ def test_a_stage_in_which_no_test_passed_is_not_passed(
     record = after(tmp_path, stage, *runs)
     assert record["stages"][stage]["ended"] == "not tried: no test ran"
     assert {run["ended"] for run in record["systems"]} <= {"not tried: no test ran"}
+
+
+def part(before: int, passed: int, *commits: str, of: int = 9) -> dict[str, Any]:
+    return {"before": before, "passed": passed, "no_time": 1, "of": of, "commits": list(commits)}
+
+
+@pytest.mark.parametrize(
+    ("parts", "ending", "ended"),
+    [
+        (part(0, 7, "a"), "passed", "passed in part: 7 of 9, of a"),
+        (part(3, 7, "a", "b", "c"), "passed", "passed in part: 7 of 9, of commits a to c"),
+        (part(3, 9, "a", "b"), "passed", "passed: 9 of 9, of commits a to b"),
+        (part(3, 7, "a", "b"), "failed", "failed: 7 of 9, of commits a to b"),
+        (part(0, 0), "failed", "failed: 0 of 9"),
+    ],
+)
+def test_a_run_in_parts_says_how_much_has_passed_and_of_which_commits(
+    tmp_path: Path, parts: dict[str, Any], ending: str, ended: str
+) -> None:
+    run = RUN | {"passed": parts["passed"], "status": int(ending == "failed"), "parts": parts}
+    record = after(tmp_path, "soak", run, ending=ending)
+    assert record["stages"]["soak"]["ended"] == ended
+    assert [one["ended"] for one in record["systems"]] == [ended]
+
+
+def test_figures_of_all_parts_of_a_run_are_shown_as_one(tmp_path: Path) -> None:
+    def run(before: int, values: int, largest: float) -> dict[str, Any]:
+        figure = {"test": "a.py::test_b", "what": "lost, s", "values": values, "largest": largest}
+        return RUN | {"parts": part(before, 7, "a"), "figures": [figure]}
+
+    record = after(tmp_path, "soak", run(0, 3, 0.25))
+    for before, values, largest, row in (
+        (7, 0, 0, ["`test_b`", "lost, s", "3", "0.25"]),
+        (7, 2, 0.125, ["`test_b`", "lost, s", "5", "0.25"]),
+        (0, 0, 0, ["`test_b`", "lost, s", "0", "none"]),
+    ):
+        (tmp_path / "runs").write_text(json.dumps(run(before, values, largest)) + "\n")
+        record = EVIDENCE.kept(record, "soak", "passed", ("1", "1"), tmp_path / "runs", "abc1234")
+        assert rows(EVIDENCE.figures_table(record), "soak") == [row]
 
 
 def test_wheels_that_nothing_resolved_are_not_passed(tmp_path: Path) -> None:

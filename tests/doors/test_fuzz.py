@@ -232,7 +232,7 @@ def test_what_is_broken_is_taken_or_refused_by_a_documented_error(
 
 
 @pytest.mark.soak
-@pytest.mark.timeout(3600)
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("name", DOORS)
 def test_two_hundred_thousand_broken_inputs(name: str, study: Study, tmp_path: Path) -> None:
     door = door_of(name, study, tmp_path)

@@ -8,7 +8,7 @@ import json
 import random
 import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -251,7 +251,15 @@ def losses(
         yield from (len(hole) / rate for hole in holes if len(hole))
 
 
-def kill_and_go_on(lab: Lab, data: Path, victims: tuple[str, ...], seed: int) -> set[str]:
+Figures = Callable[[str, object], None]
+"""``record_property``: what the evidence shows of a test."""
+
+LOST = "seconds of a stream lost at once"
+
+
+def kill_and_go_on(
+    lab: Lab, data: Path, victims: tuple[str, ...], seed: int, record_property: Figures
+) -> set[str]:
     began = time.perf_counter()
     killed = kill(lab, data, victims, random.Random(seed))
     said = go_on(lab, data)
@@ -263,6 +271,7 @@ def kill_and_go_on(lab: Lab, data: Path, victims: tuple[str, ...], seed: int) ->
         again = rf"repeated, as new attempts \(redo_trial\): {which}"
         assert re.search(again, said[0]), said[0]
     lost = check(lab, data, began, time.perf_counter())
+    record_property(LOST, lost)
     assert max(lost, default=0.0) <= (BOTH_S if killed >= set(BOTH) else CHUNK / RATE_HZ)
     return killed
 
@@ -271,9 +280,9 @@ def kill_and_go_on(lab: Lab, data: Path, victims: tuple[str, ...], seed: int) ->
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(("number", "victims"), list(enumerate(DOZEN)))
 def test_a_session_whose_processes_were_killed_comes_to_its_planned_end(
-    lab: Lab, tmp_path: Path, number: int, victims: tuple[str, ...]
+    lab: Lab, tmp_path: Path, number: int, victims: tuple[str, ...], record_property: Figures
 ) -> None:
-    assert kill_and_go_on(lab, tmp_path, victims, number) == set(victims)
+    assert kill_and_go_on(lab, tmp_path, victims, number, record_property) == set(victims)
 
 
 def shared_out(number: int) -> pytest.MarkDecorator:
@@ -292,7 +301,7 @@ def numbered(count: int) -> list:
     + [pytest.param(seed, marks=[pytest.mark.soak, shared_out(seed)]) for seed in range(1, 60)],
 )
 def test_a_session_that_is_killed_again_and_again_comes_to_its_planned_end(
-    lab: Lab, tmp_path: Path, seed: int
+    lab: Lab, tmp_path: Path, seed: int, record_property: Figures
 ) -> None:
     """Whoever dies, and in whichever order, while it is run and while it is gone on with."""
     chance, began = random.Random(3000 + seed), time.perf_counter()
@@ -303,6 +312,7 @@ def test_a_session_that_is_killed_again_and_again_comes_to_its_planned_end(
     assert killed
     go_on(lab, tmp_path)
     lost = check(lab, tmp_path, began, time.perf_counter())
+    record_property(LOST, lost)
     assert max(lost, default=0.0) <= CHUNK / RATE_HZ
 
 
@@ -310,8 +320,10 @@ def test_a_session_that_is_killed_again_and_again_comes_to_its_planned_end(
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("victim", VICTIMS)
 @pytest.mark.parametrize("number", numbered(60))
-def test_sixty_kills_of_each_process(lab: Lab, tmp_path: Path, number: int, victim: str) -> None:
-    kill_and_go_on(lab, tmp_path, (victim,), 1000 + number)
+def test_sixty_kills_of_each_process(
+    lab: Lab, tmp_path: Path, number: int, victim: str, record_property: Figures
+) -> None:
+    kill_and_go_on(lab, tmp_path, (victim,), 1000 + number, record_property)
 
 
 @pytest.mark.soak
@@ -319,6 +331,6 @@ def test_sixty_kills_of_each_process(lab: Lab, tmp_path: Path, number: int, vict
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
 @pytest.mark.parametrize("number", numbered(3))
 def test_thirty_kills_of_two_processes(
-    lab: Lab, tmp_path: Path, number: int, pair: tuple[str, str]
+    lab: Lab, tmp_path: Path, number: int, pair: tuple[str, str], record_property: Figures
 ) -> None:
-    kill_and_go_on(lab, tmp_path, pair, 2000 + number)
+    kill_and_go_on(lab, tmp_path, pair, 2000 + number, record_property)

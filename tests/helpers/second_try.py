@@ -57,7 +57,7 @@ def leave_out_passed(config: pytest.Config, items: list[pytest.Item]) -> None:
 
 
 class SecondTry:
-    """Tries once more what failed, and notes counts, times and second tries in a file.
+    """Tries once more what failed, and notes counts, times, figures and second tries in a file.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class SecondTry:
     """
 
     def __init__(self, config: pytest.Config, path: Path, passed: Path | None = None) -> None:
-        self._root = config.rootpath
+        self._config = config
         self._path = path
         self._passed = passed
         self._ended: set[str] = set()
@@ -79,6 +79,7 @@ class SecondTry:
         self._counts = {"passed": 0, "failed": 0, "skipped": 0}
         self._seconds: dict[str, float] = {}
         self._slow: set[str] = set()
+        self._figures: dict[tuple[str, str], list[float]] = {}
         self._again: list[str] = []
         self._says: list[str] = []
 
@@ -88,6 +89,11 @@ class SecondTry:
         self._seconds[name] = self._seconds.get(name, 0.0) + report.duration
         if {"slow", "long", "soak"} & set(report.keywords):
             self._slow.add(name)
+        if report.when == "call" and {"long", "soak"} & set(report.keywords):
+            for what, value in report.user_properties:
+                values = value if isinstance(value, list) else [value]
+                if all(isinstance(one, (int, float)) for one in values):
+                    self._figures.setdefault((name.partition("[")[0], what), []).extend(values)
         if report.failed:
             self._counts["failed"] += name not in self._failed
             self._failed[name] = None
@@ -100,13 +106,14 @@ class SecondTry:
     def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
         """Run what failed alone; the run is green when all of it passes."""
         before = [name for line in self._lines() for name in line["second_try"]]
-        if exitstatus == pytest.ExitCode.TESTS_FAILED and self._failed:
+        in_parts = self._config.pluginmanager.has_plugin("parts")  # the next part tries it again
+        if exitstatus == pytest.ExitCode.TESTS_FAILED and self._failed and not in_parts:
             if len(before) + len(self._failed) > MOST:
                 self._says.append(
                     f"no second try: {len(before) + len(self._failed)} tests failed in this gate, "
                     f"{MOST} may"
                 )
-            elif _passes(list(self._failed), self._root):
+            elif _passes(list(self._failed), self._config.rootpath):
                 self._again = list(self._failed)
                 session.exitstatus = pytest.ExitCode.OK
             else:
@@ -121,6 +128,11 @@ class SecondTry:
         return [json.loads(line) for line in self._path.read_text(encoding="utf-8").splitlines()]
 
     def _note(self, status: int) -> None:
+        parts = self._config.pluginmanager.get_plugin("parts")
+        so_far = parts.so_far() if parts else {}
+        if so_far:
+            self._counts["passed"] += so_far["before"]
+            self._counts["skipped"] -= so_far["no_time"]
         line = {
             "status": status,
             "system": platform.system(),
@@ -129,6 +141,11 @@ class SecondTry:
             **self._counts,
             "second_try": self._again,
             "processor_s": round(_processor_s()),
+            "figures": [
+                {"test": test, "what": what, "values": len(found), "largest": max(found, default=0)}
+                for (test, what), found in self._figures.items()
+            ],
+            "parts": so_far,
         }
         with self._path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")

@@ -163,7 +163,7 @@ SHARDS = 8
 
 
 @pytest.mark.soak
-@pytest.mark.timeout(7200)  # minutes of a processor, of which a busy computer has few to give
+@pytest.mark.timeout(1800)  # minutes of a processor, of which a busy computer has few to give
 @pytest.mark.parametrize("shard", range(SHARDS))
 @pytest.mark.parametrize("study", STUDIES)
 def test_every_fault_of_every_protocol_is_told_or_runs(

@@ -128,7 +128,7 @@ def test_two_hundred_changed_protocols_are_refused_or_run(tmp_path: Path) -> Non
 
 
 @pytest.mark.soak
-@pytest.mark.timeout(7200)  # minutes of a processor, of which a busy computer has few to give
+@pytest.mark.timeout(1800)  # minutes of a processor, of which a busy computer has few to give
 @pytest.mark.parametrize("seed", range(10))
 def test_five_thousand_changed_protocols_are_refused_or_run(tmp_path: Path, seed: int) -> None:
     of = ("everything", "aiming", "otherwise", "crane_pilot", "retrieval")[seed % 5]

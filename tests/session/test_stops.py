@@ -416,6 +416,6 @@ def test_two_hundred_and_fifty_sequences_of_stops_owe_what_is_left(stops: type[S
 
 
 @pytest.mark.soak
-@pytest.mark.timeout(3600)
+@pytest.mark.timeout(1800)
 def test_two_thousand_sequences_of_stops_owe_what_is_left(stops: type[Stops]) -> None:
     play(stops, 2000)

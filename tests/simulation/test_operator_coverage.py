@@ -85,7 +85,7 @@ def test_intervals_hold_what_was_drawn_from_the_law(spread: float) -> None:
 
 
 @pytest.mark.soak
-@pytest.mark.timeout(3600)
+@pytest.mark.timeout(1800)
 def test_intervals_hold_what_went_through_scheme_and_machine(tmp_path: Path) -> None:
     (tmp_path / "protocol.yaml").write_text(STUDY)
     data = tmp_path / "data"

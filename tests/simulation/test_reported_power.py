@@ -110,7 +110,7 @@ def test_a_contrast_of_groups_finds_what_scipys_t_test_finds_in_each_cohort() ->
 
 
 @pytest.mark.soak
-@pytest.mark.timeout(3600)
+@pytest.mark.timeout(1800)
 def test_the_intervals_of_the_reports_tests_hold_the_power_as_often_as_they_say() -> None:
     repetitions, inside = 300, 0
     # Means of 8 movements: a standard deviation of 1 over people, and of 1/8 of it within them.
