@@ -42,13 +42,13 @@ on_fault: {{session_died: redo_trial}}
 
 def labcrane(*arguments: object, **options: object) -> "subprocess.Popen[str]":
     """Start labcrane as a user does."""
+    pipes = {
+        "stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT,
+    }  # fmt: skip
     return subprocess.Popen(
         [sys.executable, "-m", "labcrane", *map(str, arguments)],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
         text=True,
-        **options,
+        **pipes | options,
     )
 
 
