@@ -8,7 +8,7 @@ reference from the same run, the ratio to it, and the largest ratio that is allo
 ``--check``, the exit status is 1 when a ratio exceeds its limit, and each such row is listed. A
 benchmark that cannot run counts as failed, with the reason, and the others continue. ``--brief``
 runs each for an instant, to check that it can run; its figures are meaningless and not written.
-All benchmarks together take 20 minutes; the computer should be idle.
+All benchmarks together take about 22 minutes; the computer should be idle.
 """
 
 import argparse

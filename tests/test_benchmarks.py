@@ -131,6 +131,11 @@ def test_every_benchmark_makes_rows_and_says_their_limits_itself() -> None:
         assert any(ast.unparse(call.func) == "Row" for call in calls), subject
 
 
+@pytest.mark.parametrize("subject", importlib.import_module("benchmarks.__main__").SUBJECTS)
+def test_every_benchmark_can_be_imported(subject: str) -> None:
+    assert callable(importlib.import_module(f"benchmarks.{subject}").rows)
+
+
 IN_SECONDS = ("scenario", "oversight", "recording", "length", "signals", "sound", "start_up")
 
 

@@ -33,7 +33,7 @@ GROUPS = {
 """What the tests are called that the stages of a gate choose by their marks."""
 
 MOST = 3
-"""How many tests of one gate may need a second try."""
+"""How many tests of one gate may need a second try; those of a fixture that failed count as one."""
 
 LONG_FOR_QUICK_S = 3.0
 """Quick tests that take longer are listed; they fail nothing."""
@@ -75,7 +75,7 @@ class SecondTry:
         self._passed = passed
         self._ended: set[str] = set()
         self._what = chosen(config)
-        self._failed: dict[str, None] = {}
+        self._failed: dict[str, object] = {}
         self._counts = {"passed": 0, "failed": 0, "skipped": 0}
         self._seconds: dict[str, float] = {}
         self._slow: set[str] = set()
@@ -96,7 +96,7 @@ class SecondTry:
                     self._figures.setdefault((name.partition("[")[0], what), []).extend(values)
         if report.failed:
             self._counts["failed"] += name not in self._failed
-            self._failed[name] = None
+            self._failed.setdefault(name, _cause(report))
         elif report.skipped or report.when == "call":
             self._counts[report.outcome] += 1
             if report.passed:
@@ -105,14 +105,11 @@ class SecondTry:
     @pytest.hookimpl(trylast=True)  # when the workers have ended
     def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
         """Run what failed alone; the run is green when all of it passes."""
-        before = [name for line in self._lines() for name in line["second_try"]]
+        tried = sum(line["faults"] for line in self._lines())
         in_parts = self._config.pluginmanager.has_plugin("parts")  # the next part tries it again
         if exitstatus == pytest.ExitCode.TESTS_FAILED and self._failed and not in_parts:
-            if len(before) + len(self._failed) > MOST:
-                self._says.append(
-                    f"no second try: {len(before) + len(self._failed)} tests failed in this gate, "
-                    f"{MOST} may"
-                )
+            if (faults := tried + self._faults()) > MOST:
+                self._says.append(f"no second try: {faults} tests failed in this gate, {MOST} may")
             elif _passes(list(self._failed), self._config.rootpath):
                 self._again = list(self._failed)
                 session.exitstatus = pytest.ExitCode.OK
@@ -122,7 +119,11 @@ class SecondTry:
             self._says.append("needed a second try: " + ", ".join(self._again))
         self._note(int(session.exitstatus))
 
-    def _lines(self) -> list[dict[str, list[str]]]:
+    def _faults(self) -> int:
+        """Return how many tests failed; those of one fixture that failed are one."""
+        return len(set(self._failed.values()))
+
+    def _lines(self) -> list[dict[str, int]]:
         if not self._path.exists():
             return []
         return [json.loads(line) for line in self._path.read_text(encoding="utf-8").splitlines()]
@@ -140,6 +141,7 @@ class SecondTry:
             "what": self._what,
             **self._counts,
             "second_try": self._again,
+            "faults": self._faults() if self._again else 0,
             "processor_s": round(_processor_s()),
             "figures": [
                 {"test": test, "what": what, "values": len(found), "largest": max(found, default=0)}
@@ -169,6 +171,15 @@ class SecondTry:
         terminalreporter.line(f"{used:.0f} s of processor{more}")
         for says in self._says:
             terminalreporter.line(says)
+
+
+def _cause(report: pytest.TestReport) -> object:
+    """Return what made a test fail: a fixture of its file that all its tests share, or itself."""
+    file, _, test = report.nodeid.partition("::")
+    where = getattr(report.longrepr, "reprcrash", None)
+    if report.when == "setup" and where is not None:
+        return file, where.path, where.lineno, where.message
+    return file, test
 
 
 def without_group(nodeid: str) -> str:

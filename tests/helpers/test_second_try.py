@@ -44,9 +44,10 @@ def gate_in(
     once: tuple[int, ...] = (),
     always: tuple[int, ...] = (),
     processes: str = "0",
+    more: str = "",
 ) -> tuple[int, str, dict]:
     """Return the status, what was said, and what is noted of the newest run."""
-    tests = TESTS.replace("__ALWAYS__", str(always)).replace("__ONCE__", str(once))
+    tests = TESTS.replace("__ALWAYS__", str(always)).replace("__ONCE__", str(once)) + more
     (folder / "test_some.py").write_text(tests)
     (folder / "conftest.py").write_text(CONFTEST)
     (folder / "pytest.ini").write_text("[pytest]\n")
@@ -88,6 +89,30 @@ def test_more_than_three_in_all_stages_of_a_gate_get_no_second_try(tmp_path: Pat
     status, said, _ = gate_in(tmp_path, once=(0, 1))
     assert status == 1
     assert "no second try: 4 tests failed in this gate, 3 may" in said
+
+
+FIXTURE = """
+
+@pytest.fixture(scope="module")
+def shared():
+    tried = Path("tried-fixture")
+    before = tried.exists()
+    tried.touch()
+    assert before
+
+@pytest.mark.parametrize("number", range(6))
+def test_of_a_fixture(shared, number):
+    pass
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("processes", ["0", "2"])
+def test_a_fixture_that_fails_counts_as_one_test(tmp_path: Path, processes: str) -> None:
+    status, said, noted = gate_in(tmp_path, once=(0, 1), processes=processes, more=FIXTURE)
+    assert (status, noted["status"], noted["faults"]) == (0, 0, 3), said
+    assert "test_some.py::test_of_a_fixture[0]" in noted["second_try"]
+    assert len(noted["second_try"]) > 3
 
 
 @pytest.mark.slow
