@@ -75,7 +75,9 @@ def test_a_plugin_imports_public_names_only(plugin: Path) -> None:
 TEMPLATES = ROOT / "labcrane" / "registry" / "templates"
 
 
-@pytest.mark.parametrize("path", sorted(TEMPLATES.rglob("*.py")), ids=str)
+@pytest.mark.parametrize(
+    "path", sorted(TEMPLATES.rglob("*.py")), ids=lambda path: str(path.relative_to(TEMPLATES))
+)
 def test_a_new_plugin_imports_public_names_only(path: Path) -> None:
     assert not private_names(path.read_text(encoding="utf-8"))
 
@@ -183,7 +185,11 @@ def test_the_top_level_shows_packages() -> None:
     assert modules == {"__init__.py", "__main__.py", "errors.py", "limits.py", "types.py"}
 
 
-@pytest.mark.parametrize("package", packages("labcrane") + packages("plugins"), ids=str)
+@pytest.mark.parametrize(
+    "package",
+    packages("labcrane") + packages("plugins"),
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
 def test_a_package_is_taken_in_at_a_glance(package: Path) -> None:
     modules = {path.stem for path in package.glob("*.py")} - {"__init__"}
     assert len(modules) <= MOST_MODULES, sorted(modules)

@@ -157,11 +157,16 @@ def test_killed_hanging_and_raising_feedback_leave_the_session_as_it_is(
     session = lab.open_recording(data / "P001-SIMULATED" / "P001-SIMULATED.h5").session(1)
     events = session.events
     lost = events[events["name"] == "feedback.lost"]
-    why = {data["what"]: data["why"] for data in lost["data"]}
-    assert set(why) == {"killed", "hanging", "raising"}
-    assert "its process ended with exit code -9" in why["killed"]
-    assert "it has not responded for" in why["hanging"]
-    assert "ValueError: a mistake in a plugin" in why["raising"]
+    why: dict[str, list[str]] = {}
+    for data in lost["data"]:  # a busy computer may keep one of them silent as well
+        why.setdefault(data["what"], []).append(data["why"])
+    for name, reason in {
+        "killed": "its process ended with exit code -9",
+        "hanging": "it has not responded for",
+        "raising": "ValueError: a mistake in a plugin",
+    }.items():
+        assert any(reason in each for each in why.pop(name))
+    assert not why
 
     loop = session.streams["loop"].data
     np.testing.assert_array_equal(np.diff(loop["tick"]), 1.0)  # not one tick is missing
