@@ -90,8 +90,11 @@ CHUNK = 16
 LABS = 6
 """Laboratories among which the many kills are shared out: sessions wait in real time, so that
 ``pytest -n 6`` takes far less than six times one."""
-BOTH_S = 1.0
-"""What the death of both recorders at once may cost, in seconds of samples."""
+BOTH_S = 2.0
+"""What the death of both recorders at once may cost, in seconds of samples.
+
+Twice of what ``test_kill_recorder`` allows: here sessions in other processes share the cores.
+"""
 
 
 @dataclass

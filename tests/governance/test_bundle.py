@@ -25,6 +25,12 @@ from labcrane.registry.registry import discover
 
 ROOT = Path(__file__).parents[2]
 PROTOCOL = (ROOT / "tests" / "recording" / "before" / "protocol.yaml").read_text(encoding="utf-8")
+ANSWERED = """\
+environment: refuse
+expected: [scheme.map.slew, scheme.map.wrist, feedback.ball]
+"""
+"""What is locked has no open warnings."""
+
 CALM = ["--participant", "P001", "--simulate", "--fast"]
 
 
@@ -32,7 +38,7 @@ def study(folder: Path) -> Path:
     folder.mkdir()
     path = folder / "protocol.yaml"
     text = PROTOCOL.replace("{use: dual_joystick}", "{use: simulated_operator}")
-    path.write_text("environment: refuse\n" + text, encoding="utf-8")
+    path.write_text(ANSWERED + text, encoding="utf-8")
     (folder / "consent.txt").write_text("I take part.\n", encoding="utf-8")
     return path
 

@@ -27,11 +27,11 @@ def test_the_supervisor_says_with_a_button_which_stream_is_meant(
         with a_room(protocol, tmp_path / "data") as room:
             wait_for(lambda: room.process("pages"))
             browser.get(room.links()["supervisor"])
-            shown(browser, "streams", "is 'Plate' (source_id 'plate-1')")
+            shown(browser, "streams", "Record 'Plate' (source_id 'plate-1') ")
             shown(browser, "take-force-0", "Use Plate on ")
             assert not room.process("session"), "it has not begun"
             press(browser, "take-force-0")
-            wait_for(lambda: any("stream force is 'Plate'" in line for line in room.said))
+            wait_for(lambda: any("was confirmed: it is 'Plate'" in line for line in room.said))
             shown(browser, "streams", "flows")
             shown(browser, "events", "Stream force is 'Plate'")
     finally:

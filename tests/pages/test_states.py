@@ -146,10 +146,10 @@ def test_every_state_of_the_control_room_is_for_everybody(
                 shown(browser, "consent-version", CONSENT["version"])
             check(browser, f"supervisor-{state}")
         told.ends()
-        shown(browser, "report-verdict", "not complete: 3 trials")
+        shown(browser, "report-verdict", "remaining: 3 trials")
         check(browser, "supervisor-report")
         browser.refresh()
-        shown(browser, "report-verdict", "not complete: 3 trials")
+        shown(browser, "report-verdict", "remaining: 3 trials")
 
 
 @pytest.mark.timeout(900)

@@ -581,8 +581,8 @@ def mark_and_take_back(browser: webdriver.Chrome, file: Path, film: Film) -> Non
     assert record.annotations["time"].tolist()[1] == pytest.approx(film.start + 3.5, abs=1e-6)
     assert len(browser.find_elements(By.CLASS_NAME, "view-mark")) == 2
     check(browser, "viewer with marks")
-    browser.find_element(By.CSS_SELECTOR, "[aria-label='Take back: a slip']").click()
-    wait_for(lambda: "taken back" in text(browser, "mark-said"))
+    browser.find_element(By.CSS_SELECTOR, "[aria-label='Withdraw: a slip']").click()
+    wait_for(lambda: "withdrawn" in text(browser, "mark-said"))
     assert "a slip" not in text(browser, "marks")
     assert record.annotations["text"].tolist() == ["looked away"]
 

@@ -129,7 +129,7 @@ def test_the_yaml_language_server_shows_units_and_offers_what_is_installed(
             "rate_h": ("Ticks of the loop per second. Plain numbers are in Hz", "1 kHz"),
             "movements: 4, end: rest_inside, limit": ("in seconds; then it ends as a", "200 ms"),
             "6], wid": ("Diameter of a circle, in metres. Plain numbers are in m", "50 cm"),
-            "at: target, fa": ("Distance of tip and target, in metres", "50 cm"),
+            "at: target, fa": ("Distance between tip and target, in metres", "50 cm"),
         }.items():
             hover = editor.hover(path, *place(text, word))
             assert all(each in hover for each in shown), (word, hover)

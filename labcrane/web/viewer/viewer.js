@@ -87,7 +87,7 @@ export default {
       <p v-if="!marks.length" class="room-faint">None yet. Go to a moment, press M, and describe what you see.</p>
       <div v-for="m in marks" :key="m.number" class="view-marked">
         <button type="button" class="view-event" @click="go(m.t)"><span>{{ clock(m.t) }}{{ m.to > m.t ? ' to ' + clock(m.to) : '' }}</span> {{ m.text }}</button>
-        <button type="button" class="room-button" :aria-label="'Take back: ' + m.text" @click="takeBack(m)">Take back</button></div></div>
+        <button type="button" class="room-button" :aria-label="'Withdraw: ' + m.text" @click="withdraw(m)">Withdraw</button></div></div>
   </section>
   <section class="room-card"><h2>Events</h2>
     <label class="room-field">Find <input id="find" v-model="find" autocomplete="off"></label>
@@ -213,7 +213,7 @@ export default {
       const other = this.from === null ? this.t : this.from;
       this.change({ t: Math.min(other, this.t), to: Math.max(other, this.t), text: this.words });
     },
-    takeBack(mark) { this.change({ withdraw: mark.number }); },
+    withdraw(mark) { this.change({ withdraw: mark.number }); },
     change(what) { this.question(`mark ${this.asked}`, { kind: "mark", ...what }); }, // none replaces another
     marked({ marks, markSaid }) { // what was written stays until it is kept
       this.marks = marks;
