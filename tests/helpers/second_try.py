@@ -105,7 +105,7 @@ class SecondTry:
     @pytest.hookimpl(trylast=True)  # when the workers have ended
     def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
         """Run what failed alone; the run is green when all of it passes."""
-        tried = sum(line["faults"] for line in self._lines())
+        tried = sum(line.get("faults", 0) for line in self._lines())  # a command's line has none
         in_parts = self._config.pluginmanager.has_plugin("parts")  # the next part tries it again
         if exitstatus == pytest.ExitCode.TESTS_FAILED and self._failed and not in_parts:
             if (faults := tried + self._faults()) > MOST:

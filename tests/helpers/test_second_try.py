@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from gate_program import gate_program
 from second_try import QUICK, without_group
 
 TESTS = """
@@ -113,6 +114,14 @@ def test_a_fixture_that_fails_counts_as_one_test(tmp_path: Path, processes: str)
     assert (status, noted["status"], noted["faults"]) == (0, 0, 3), said
     assert "test_some.py::test_of_a_fixture[0]" in noted["second_try"]
     assert len(noted["second_try"]) > 3
+
+
+@pytest.mark.slow
+def test_a_run_after_a_command_of_its_stage_counts_as_any_other(tmp_path: Path) -> None:
+    line = gate_program("evidence").noted("Linux", "3.13", "labcrane demo", "0", "")
+    (tmp_path / "runs").write_text(json.dumps(line) + "\n")
+    status, said, noted = gate_in(tmp_path, once=(1,))
+    assert (status, noted["second_try"]) == (0, ["test_some.py::test_it[1]"]), said
 
 
 @pytest.mark.slow
