@@ -1,11 +1,14 @@
 """Runs that take hours, in parts: what has passed is noted and not run again, and time is bounded.
 
-``pytest -m soak tests/faults/test_kills.py -n 8 --noted kills.txt --for 1200`` begins only tests
+``pytest -m soak tests/faults/test_kills.py -n 8 --noted=kills.txt --for 1200`` begins only tests
 whose timeout ends within 1,200 s, those with the longest first. It writes what passes into
 ``kills.txt`` with the commit it passed on, and ends by saying how much of all is done; the same
 command again goes on from there. What fails is never noted: it is run again. What passes while
 files differ from the commit is not noted. When all has passed, the file is renamed to
 ``kills.txt.complete``, so that the next run tries everything anew.
+
+The sign = is needed where the file is in another project: pytest takes a word that is the path of a
+file for one of tests, and would look for its settings there.
 """
 
 import os
@@ -93,12 +96,12 @@ class Parts:
         self, config: pytest.Config, items: list[pytest.Item]
     ) -> None:
         """Leave out what has passed before, and begin with what may take longest."""
-        done = [item for item in items if item.nodeid in self._before]
+        done = [item for item in items if without_group(item.nodeid) in self._before]
         config.hook.pytest_deselected(items=done)
-        items[:] = [item for item in items if item.nodeid not in self._before]
+        items[:] = [item for item in items if without_group(item.nodeid) not in self._before]
         items.sort(key=_timeout, reverse=True)
         self._collected = len(items)
-        self._left_out = {item.nodeid for item in done}
+        self._left_out = {without_group(item.nodeid) for item in done}
         self._output["left_out"] = sorted(self._left_out)
 
     @pytest.hookimpl(tryfirst=True)

@@ -12,6 +12,7 @@ TESTS = """
 import pytest
 
 @pytest.mark.soak
+@pytest.mark.xdist_group("one process")
 @pytest.mark.parametrize("number", range(4))
 def test_it(number, record_property):
     record_property("number", number)
@@ -38,15 +39,30 @@ def pytest_configure(config):
 """
 
 
+INI = """
+[pytest]
+addopts = --dist loadgroup
+timeout = 100
+markers =
+    soak: many
+"""
+
+
 def run_in(folder: Path, *words: str, broken: int = 9) -> tuple[int, str, dict]:
-    """Return the status, what was said, and what is noted for the evidence."""
-    (folder / "test_some.py").write_text(TESTS.format(broken=broken))
-    (folder / "conftest.py").write_text(CONFTEST)
-    (folder / "pytest.ini").write_text("[pytest]\ntimeout = 100\nmarkers =\n    soak: many\n")
-    (folder / "runs").unlink(missing_ok=True)
+    """Return the status, what was said, and what is noted for the evidence.
+
+    As in the soak stage, the tests are a copy, and the noted file is in the project's own folder.
+    """
+    copy = folder / "copy"
+    copy.mkdir(exist_ok=True)
+    (copy / "test_some.py").write_text(TESTS.format(broken=broken))
+    (copy / "conftest.py").write_text(CONFTEST)
+    for each in (folder, copy):
+        (each / "pytest.ini").write_text(INI)
+    (copy / "runs").unlink(missing_ok=True)
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "--noted", "noted.txt", *words],
-        cwd=folder,
+        [sys.executable, "-m", "pytest", "-q", f"--noted={folder / 'noted.txt'}", *words],
+        cwd=copy,
         # A file written twice in one second at one length looks the same to Python's cache.
         env={
             "PYTHONPATH": str(Path(__file__).parent), "PATH": "", "PYTHONDONTWRITEBYTECODE": "1",
@@ -55,7 +71,7 @@ def run_in(folder: Path, *words: str, broken: int = 9) -> tuple[int, str, dict]:
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     said = done.stdout + done.stderr
-    return done.returncode, said, json.loads((folder / "runs").read_text() or "{}")
+    return done.returncode, said, json.loads((copy / "runs").read_text() or "{}")
 
 
 def noted_in(folder: Path) -> list[str]:
