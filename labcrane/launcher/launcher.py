@@ -7,7 +7,7 @@ the participant file, so that ``labcrane resume`` can continue the session.
 
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from labcrane.core.records import Event
@@ -17,7 +17,7 @@ from labcrane.launcher.hang_detector import HangDetector
 from labcrane.launcher.session_handle import SessionHandle
 from labcrane.launcher.session_process import Offered, SessionEnded
 from labcrane.launcher.signal_reporter import SignalReporter, monitor_config
-from labcrane.recording.crash_marker import read_crash_marker
+from labcrane.recording.crash_marker import read_crash_marker, take_crash_marker
 from labcrane.recording.paths import parts
 from labcrane.session.commands import (
     Command,
@@ -214,7 +214,9 @@ class Launcher:
         return False
 
     def _run(self) -> int | None:
-        session = SessionHandle(self._visit, self._say)
+        # What a process that died has left would look as if the new one hung in its beginning.
+        died = take_crash_marker(self._visit.crash_marker)
+        session = SessionHandle(replace(self._visit, died=died), self._say)
         try:
             return self._watch(session)
         finally:

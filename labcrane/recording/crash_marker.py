@@ -111,6 +111,22 @@ class CrashMarkerFile:
         self._path.unlink(missing_ok=True)
 
 
+def take_crash_marker(path: Path) -> CrashMarker | None:
+    """Return where a session's process died, and remove the file; None when there is none.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be removed.
+    """
+    found = read_crash_marker(path)
+    try:
+        clear(path)
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be removed: {error.strerror}") from error
+    return found
+
+
 def clear(path: Path) -> None:
     """Make room for the file of a session: of a process that died, and was read.
 

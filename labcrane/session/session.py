@@ -193,7 +193,7 @@ def _record(
     carried = _carried(visit) if so_far is None else so_far.carried
     rig = Rig.build(study, simulated=visit.simulated)
     clock = _clock(visit, so_far)
-    died = read_crash_marker(visit.crash_marker) if visit.resumed else None
+    died = visit.died or read_crash_marker(visit.crash_marker) if visit.resumed else None
     with (
         _scheduled(visit) as scheduling,
         _awake(visit) as awake,

@@ -11,7 +11,7 @@ from typing import Any
 from labcrane.errors import ProtocolError
 from labcrane.files.yaml import read_text
 from labcrane.protocol.study import Study, load
-from labcrane.recording.crash_marker import crash_marker_path
+from labcrane.recording.crash_marker import CrashMarker, crash_marker_path
 from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.journal import START
 from labcrane.recording.journal_reader import read_journal
@@ -46,6 +46,8 @@ class Visit:
         Whether the loop is scheduled in real time.
     core
         The processor core that is left to it then; None for any.
+    died
+        Where its process died before, as the launcher read it; None where nothing says so.
     """
 
     study: Study
@@ -60,6 +62,7 @@ class Visit:
     feedback: bool = False
     real_time: bool = False
     core: int | None = None
+    died: CrashMarker | None = None
 
     @property
     def folder(self) -> DataFolder:

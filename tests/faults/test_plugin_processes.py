@@ -2,6 +2,7 @@
 
 import multiprocessing
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ from faults.faulty_study import (
 from labcrane import LabcraneError, open_recording
 from labcrane.cli.app import main
 from labcrane.feedback import handle as feedback_handle
+from labcrane.launcher import hang_detector
 from labcrane.launcher.launcher import Launcher, Outcome
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.session.commands import QueueConsole
@@ -63,8 +65,9 @@ def recorded_in_parts(protocol: Path) -> SessionRecord:
     return open_recording(path).session(1)
 
 
-def launch(protocol: Path) -> tuple[Outcome, list[str]]:
+def launch(protocol: Path, *, resumed: bool = False) -> tuple[Outcome, list[str]]:
     order = visit_of(protocol, "P001", 1, protocol.parent / "data", simulated=True, feedback=False)
+    order = replace(order, resumed=resumed)
     told: list[str] = []
     return Launcher(order, QueueConsole(), told.append).run(), told
 
@@ -106,6 +109,26 @@ def test_a_component_that_hangs_is_named_and_its_process_ended(spoil: Spoil) -> 
     session = recorded(protocol)
     assert session is not None
     assert len(session.streams["loop"].data) == tick
+
+
+@pytest.mark.slow
+def test_a_session_that_begins_slowly_is_not_ended_for_where_it_died_before(
+    spoil: Spoil, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its marker stands still until the new process has loaded the study and read its journals."""
+    protocol = spoil("task evaluate 30 exiting")
+    assert launch(protocol)[0].died == 7
+    (protocol.parent / "plugins" / "order.txt").write_text("nobody nothing 1 raising")
+    patience_s = 3.0
+    monkeypatch.setattr(hang_detector, "HANG_S", patience_s)
+    slow = f"import sys, time\nif 'session_process' in sys.argv[0]: time.sleep({patience_s + 1})\n"
+    (protocol.parent / "plugins" / "slow.py").write_text(slow)
+    outcome, told = launch(protocol, resumed=True)
+    assert outcome.died is None, told
+    events = recorded_in_parts(protocol).events
+    died = events.query("name == 'session.died'")["data"].iloc[0]
+    assert died["where"].startswith("task 'faulty_task' of plugin 'plugins/faulty.py', in evaluate")
+    assert events["data"].iloc[-1]["reason"] == "complete"
 
 
 PRESENTING = """\
