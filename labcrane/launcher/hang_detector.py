@@ -1,9 +1,9 @@
 """Detector of a session that hangs in a component, from outside its process."""
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 
+from labcrane.processes.watch_clock import WatchClock
 from labcrane.recording.crash_marker import read_crash_marker, read_number
 
 TELL_S = 2.0
@@ -23,12 +23,13 @@ class HangDetector:
         self._path = path
         self._say = say
         self._number: int | None = None
-        self._since = time.monotonic()
+        self._clock = WatchClock()
+        self._since = self._clock()
         self._told = False
 
     def hangs(self) -> bool:
         """Look again; return whether a component has had the process for too long."""
-        number, now = read_number(self._path), time.monotonic()
+        number, now = read_number(self._path), self._clock()
         if number is None or number != self._number:
             self._number, self._since, self._told = number, now, False
             return False

@@ -12,13 +12,13 @@ import queue
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import IO, Any
 
 from labcrane.processes.messages import Inbox, received, send
+from labcrane.processes.watch_clock import WatchClock
 
 LAST_S = 1.0
 """How long reading the last messages of a process that has ended may take, in seconds."""
@@ -58,7 +58,7 @@ class _Life:
     process: "subprocess.Popen[bytes]"
     input: IO[bytes]
     output: IO[bytes]
-    heard: float = field(default_factory=time.monotonic)
+    heard: float
     outgoing: "queue.SimpleQueue[bytes | None]" = field(default_factory=queue.SimpleQueue)
     threads: list[threading.Thread] = field(default_factory=list)
 
@@ -102,6 +102,7 @@ class ProcessHandle:
         self._patience = patience
         self._take = take
         self._fruitless = 0
+        self._clock = WatchClock()
         self._inbox: Inbox[Any] = Inbox()
         self._life: _Life | None = None
 
@@ -122,12 +123,17 @@ class ProcessHandle:
         return self._present.process.poll()
 
     @property
+    def silent_s(self) -> float:
+        """For how long nothing was heard of the present process, in seconds."""
+        return self._clock() - self._present.heard
+
+    @property
     def failure(self) -> str | None:
         """Return why the present process is of no use, in words; None while all is well."""
         if (code := self.exit_code) is not None:
             self._present.threads[0].join(LAST_S)  # its last words may say why
             return f"its process ended with exit code {code}"
-        silent = time.monotonic() - self._present.heard
+        silent = self.silent_s
         patience = self._patience.silent_s if self.ready else self._patience.start_s
         return f"it has not responded for {silent:.0f} s" if silent > patience else None
 
@@ -209,7 +215,7 @@ class ProcessHandle:
         )
         if process.stdin is None or process.stdout is None:
             raise AssertionError("it is started with pipes")
-        life = _Life(process, process.stdin, process.stdout)
+        life = _Life(process, process.stdin, process.stdout, self._clock())
         if first is not None:
             life.outgoing.put(first)
         life.threads = [
@@ -222,7 +228,7 @@ class ProcessHandle:
 
     def _hear(self, life: _Life) -> None:
         for message in received(life.output):
-            life.heard = time.monotonic()
+            life.heard = self._clock()
             (self._take or self._inbox.put)(message)
             self._inbox.wake()
         life.process.wait()

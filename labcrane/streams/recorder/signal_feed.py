@@ -9,7 +9,6 @@ import queue
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict
@@ -21,6 +20,7 @@ import numpy.typing as npt
 from labcrane.core.signals import SignalChannel, SignalStream
 from labcrane.limits import LIMITS
 from labcrane.processes.handle import SAFELY
+from labcrane.processes.watch_clock import WatchClock
 from labcrane.recording.foreign_streams import MONITORS, SIGNAL
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.streams.request import OURS
@@ -127,7 +127,8 @@ class SignalFeed:
         self._waiting = 0
         self._asked = 0
         self._answered = 0
-        self._heard = time.monotonic()
+        self._clock = WatchClock()
+        self._heard = self._clock()
         self._deaths = 0
         self._over = False
         self._process: subprocess.Popen[bytes] | None = None
@@ -154,7 +155,7 @@ class SignalFeed:
         process = self._process
         waits = self._asked > self._answered
         patience = self._hang_s if self._answered else START_S
-        if process is not None and waits and time.monotonic() - self._heard > patience:
+        if process is not None and waits and self._clock() - self._heard > patience:
             process.kill()
 
     def close(self) -> None:
@@ -211,14 +212,14 @@ class SignalFeed:
         assert self._process is not None  # noqa: S101 - started before
         assert self._process.stdin is not None  # noqa: S101 - it is a pipe
         if self._asked == self._answered:
-            self._heard = time.monotonic()
+            self._heard = self._clock()
         self._asked += 1
         self._process.stdin.write(json.dumps(message).encode() + b"\n" + body)
         self._process.stdin.flush()
 
     def _start(self) -> None:
         self._asked = self._answered = 0
-        self._heard = time.monotonic()
+        self._heard = self._clock()
         process = subprocess.Popen(  # noqa: S603 - ourselves
             self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE
         )
@@ -248,6 +249,6 @@ class SignalFeed:
         with lines:
             for line in lines:
                 answer = json.loads(line)
-                self._heard = time.monotonic()
+                self._heard = self._clock()
                 self._answered += 1
                 self._taps[answer["number"]].hear(answer)
