@@ -163,7 +163,7 @@ class Launcher:
         while recorder is not None and not (recorder.ready and not (asked and recorder.asks)):
             recorder.watch()
             self._kept += self._signals.news(recorder)
-            if recorder.status and recorder.complaints() != told:
+            if recorder.complaints() != told:
                 told = recorder.complaints()
                 self._say("waiting for streams:\n" + "\n".join(f"  {line}" for line in told))
             if self._told_to_end():

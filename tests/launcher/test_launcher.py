@@ -1,8 +1,9 @@
-"""What people say before a session runs, and recorders that do not end as they should."""
+"""What people say before a session runs, and recorders that hang or do not end in order."""
 
 import os
 from pathlib import Path
 
+import psutil
 import pytest
 from faults.sessions import STUDY, unique, wait_for
 
@@ -166,6 +167,37 @@ def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
     ]
     assert [one.exit_code for one in handle._recorders] == [0, 0]
     assert [one.exit_code for one in handle._spares] == [-9, -9]
+
+
+@pytest.mark.slow
+def test_of_two_recorders_the_one_that_hangs_is_not_believed_and_neither_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_handle, "SILENT_S", 2.5)
+    handle = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
+    processes = [psutil.Process(one.pid) for one in handle._recorders]
+    try:
+        wait_for(lambda: all(one.status for one in handle._recorders))
+        journals = [one.status["journal"] for one in handle._recorders]
+        assert handle.status["journal"] == journals[0]
+        processes[0].suspend()
+        wait_for(lambda: handle.status["journal"] == journals[1])
+        assert handle.complaints() == []
+        processes[1].suspend()
+        wait_for(lambda: handle.status == {})
+        assert handle.complaints() == [
+            "recorder: none has responded for over 2.5 s; check the data's disk"
+        ]
+        assert not handle.watch()  # what they have received is not in their journals yet
+        processes[0].resume()
+        wait_for(lambda: handle.status)
+        assert handle.status["journal"] == journals[0]
+        assert handle.complaints() == []
+    finally:
+        for process in processes:
+            process.resume()
+        handle.stop()
+    assert handle.restarts == 0
 
 
 def test_a_recorder_that_dies_as_it_is_given_its_orders_is_replaced(

@@ -22,6 +22,9 @@ MODULE = "labcrane.streams.recorder.process"
 PATIENCE_S = 15.0
 """How long a recorder may take to close its journal when it is told to stop, or a spare to end."""
 
+SILENT_S = 10.0
+"""A recorder that has not reported for so long may hang: what it last said is not believed."""
+
 OF_SIGNALS = ("signals", "unwatched")
 """What of a stream's status only the recorder beside the monitors knows."""
 
@@ -67,9 +70,12 @@ class RecorderHandle:
 
     @property
     def status(self) -> dict[str, Any]:
-        """The last report of who has recorded longest; empty before any has spoken."""
+        """The last report of who has recorded longest; empty before any has spoken.
+
+        It is empty, too, when all that have spoken are silent.
+        """
         for recorder in self._recorders:
-            if recorder.exit_code is None and recorder.status:
+            if recorder.exit_code is None and recorder.status and recorder.silent_s < SILENT_S:
                 return recorder.status | {"streams": self._with_signals(recorder.status)}
         return {}
 
@@ -97,6 +103,8 @@ class RecorderHandle:
 
     def complaints(self) -> list[str]:
         """Return what is not as it should be, one line for each complaint."""
+        if all(one.status and one.silent_s >= SILENT_S for one in self._recorders):
+            return [f"recorder: none has responded for over {SILENT_S:g} s; check the data's disk"]
         lines = [f"recorder: {fault}" for fault in self.status.get("faults", ())]
         for stream in self.status.get("streams", ()):
             lines += [f"{stream['label']}: {warning}" for warning in stream["warnings"]]
