@@ -179,7 +179,7 @@ def _wait(recorder: "RecorderHandle", seconds: float | None) -> None:
                 ends = time.monotonic() + seconds
             if recorder.watch():
                 out.print("the recorder died and was started again")
-            if recorder.status and recorder.complaints() != told:
+            if recorder.complaints() != told:
                 told = recorder.complaints()
                 for line in told:
                     out.print(line, markup=False)
