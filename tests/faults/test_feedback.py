@@ -1,22 +1,18 @@
 """Views and sounds that are killed, hang or raise: the session goes on as if nothing had been."""
 
 import signal
-import subprocess
-import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
-from faults.sessions import kill_all, labcrane, unique, wait_for
-from faults.test_streams import Conversation
+from faults.sessions import unique, wait_for
 from needs import GRAPHICS, needs
 from simple_crane import FORM
 
 import labcrane as lab
 from labcrane.core.records import Event
-from labcrane.feedback.handle import SILENT_S
 from labcrane.launcher.launcher import Launcher
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.session.commands import Command, Order, QueueConsole
@@ -184,37 +180,6 @@ def test_killed_hanging_and_raising_feedback_leave_the_session_as_it_is(
         assert shown["frame.tick"].max() > loop["tick"].max() - 240  # it went on to the end
         assert (np.diff(shown["frame.tick"]) >= 0).all()
     what_was_shown_can_be_rebuilt(session)
-
-
-@pytest.mark.slow
-@needs(*GRAPHICS)
-def test_a_launcher_that_stood_still_takes_no_view_for_hung(protocol: Path, tmp_path: Path) -> None:
-    lines = protocol.read_text().splitlines(keepends=True)
-    text = "".join(line for line in lines if "hanging: {" not in line and "raising: {" not in line)
-    text = text.replace("seconds: 900", "seconds: 13", 1).replace("seconds: 900", "seconds: 1")
-    protocol.write_text(text)
-    process = labcrane(
-        *("run", protocol, "--participant", "P001", "--simulate", "--feedback"),
-        *("--data", tmp_path / "data"),
-        stdin=subprocess.PIPE,
-    )
-    said = Conversation(process)
-    try:
-        said.until("break of 13 s")
-        for _ in range(3):
-            process.send_signal(signal.SIGSTOP)  # as Ctrl-Z: its processes go on
-            time.sleep(SILENT_S + 0.5)  # what they say waits in pipes
-            process.send_signal(signal.SIGCONT)
-            time.sleep(0.3)
-        printed = said.end()
-    finally:
-        if process.poll() is None:
-            kill_all(process)
-    assert process.returncode == 0, printed
-    file = tmp_path / "data" / "P001-SIMULATED" / "P001-SIMULATED.h5"
-    names = lab.open_recording(file).session(1).events["name"].tolist()
-    assert "feedback.lost" not in names
-    assert names.count("block.end") == 3
 
 
 def what_was_shown_can_be_rebuilt(session: SessionRecord) -> None:

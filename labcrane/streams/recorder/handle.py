@@ -23,7 +23,7 @@ PATIENCE_S = 15.0
 """How long a recorder may take to close its journal when it is told to stop, or a spare to end."""
 
 SILENT_S = 10.0
-"""A recorder that has not reported for so long may hang: what it last said is not believed."""
+"""A recorder that has not reported for so long may hang: its last report is not used."""
 
 OF_SIGNALS = ("signals", "unwatched")
 """What of a stream's status only the recorder beside the monitors knows."""
@@ -104,7 +104,8 @@ class RecorderHandle:
     def complaints(self) -> list[str]:
         """Return what is not as it should be, one line for each complaint."""
         if all(one.status and one.silent_s >= SILENT_S for one in self._recorders):
-            return [f"recorder: none has responded for over {SILENT_S:g} s; check the data's disk"]
+            silent = f"none has responded for over {SILENT_S:g} s"
+            return [f"recorder: {silent}; check the disk of the data folder"]
         lines = [f"recorder: {fault}" for fault in self.status.get("faults", ())]
         for stream in self.status.get("streams", ()):
             lines += [f"{stream['label']}: {warning}" for warning in stream["warnings"]]
