@@ -148,17 +148,17 @@ def exclusions(movements: "pd.DataFrame") -> "pd.DataFrame":
 def is_result(movements: "pd.DataFrame") -> "pd.Series[bool]":
     """Return which movements are results: successful, with an onset, shown, and no practice.
 
-    A repeated trial's attempts before the last have the outcome ``repeated``.
+    Attempts that are not the trial's last are not successful, see :data:`core.records.UNDONE`.
     """
     import pandas as pd
 
     if movements.empty:  # sessions that ended before their first result have no columns either
         return pd.Series([], index=movements.index, dtype=bool)
     counts = (movements["practice"].astype(float) == 0.0) & ~not_presented(movements)
-    return is_done(movements) & counts
+    return is_success(movements) & counts
 
 
-def is_done(movements: "pd.DataFrame") -> "pd.Series[bool]":
+def is_success(movements: "pd.DataFrame") -> "pd.Series[bool]":
     """Return which movements are successes in which something moved, practice among them."""
     return (movements["outcome"] == "success") & ~without_onset(movements)
 

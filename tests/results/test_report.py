@@ -1,6 +1,7 @@
 """The report, and the commands."""
 
 import json
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -186,6 +187,28 @@ def test_time_outs_are_told_by_condition_with_a_median_in_which_they_take_longer
     )
     (said,) = paragraphs(results, STYLES["tex"])
     assert r"6 (40.0 \%) ended" in said
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_trials_that_needed_several_attempts_count_as_one_trial(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    planned = int(random.integers(5, 40))
+    rows = []
+    for trial in range(planned):
+        cut = random.choice(["repeated", "ended", "interrupted"], random.integers(0, 4)).tolist()
+        ended = str(random.choice(["success", "timeout", "skipped", "failure"]))
+        rows += [
+            {"participant": "P001", "practice": 0, "distance": 2.0, "trial": trial,
+             "attempt": attempt, "outcome": outcome, "started": 0.0, "ended": 4.0}
+            for attempt, outcome in enumerate([*cut, ended], 1)
+        ]  # fmt: skip
+    [counts] = time_outs(pd.DataFrame(rows), ["distance"]).to_dict("records")
+    last = [row["outcome"] for row, after in pairwise([*rows, {"attempt": 1}])
+            if after["attempt"] == 1]  # fmt: skip
+    assert counts["trials"] == planned
+    assert counts["successes"] == last.count("success")
+    assert counts["time_outs"] == last.count("timeout")
+    assert counts["others"] == planned - last.count("success") - last.count("timeout")
 
 
 def test_a_mean_of_two_people_has_no_bar_in_figures_and_its_interval_in_the_table() -> None:

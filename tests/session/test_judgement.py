@@ -395,3 +395,46 @@ def test_page_and_terminal_say_what_it_waits_for_and_can_judge_also_after_a_resu
     assert found["order-repeat"].why
     view.take(Event("judgement.over", 2.0, {"trial": 3, "attempt": 1, "done": True}))
     assert state_of(view) == "between"
+
+
+class Cuts(Supervisor):
+    """Gives one command within a test; None is a killed process."""
+
+    def __init__(self, trial: int, command: Command | None) -> None:
+        super().__init__(lambda event: [GO])
+        self._trial, self._command, self._left = trial, command, 8
+
+    def commands(self) -> list[Command]:
+        given = super().commands()
+        running = [event for event in self.heard if event.name == "trial.start"]
+        if not running or running[-1].data["trial"] != self._trial or not self._left:
+            return given
+        self._left -= 1
+        if self._left:
+            return given
+        if self._command is None:
+            raise DiesError
+        return [self._command]
+
+
+@pytest.mark.parametrize("trial", [3, 4])
+@pytest.mark.parametrize("order", [None, Order.END, Order.REPEAT, Order.SKIP])
+def test_a_test_that_is_cut_off_costs_nobody_the_score_of_the_others(
+    tmp_path: Path, trial: int, order: Order | None
+) -> None:
+    """Where it is done again, the last attempt is scored; what was skipped is named."""
+    visit = a_visit(tmp_path, hard=99)
+    try:
+        run(visit, Cuts(trial, order and Command(order)))
+    except DiesError:
+        assert order is None
+    if order in {None, Order.END}:
+        run(replace(visit, resumed=True), Supervisor(lambda event: [GO]))
+    left_out: list[tuple[str, str]] = []
+    cohort = find_cohort(visit.data, ["pilot", "half-finished"])
+    tests = operator_tests(cohort, leave_out=lambda *about: left_out.append(about))
+    whole = {3, 4} - ({trial} if order is Order.SKIP else set())
+    assert {test.trial for test in tests} == whole
+    assert len(tests) == len(whole)
+    said = f"skipped trial {trial} of session 1: nothing there to score"
+    assert [why for _, why in left_out] == [said] * (order is Order.SKIP)

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.presented import not_presented
-from labcrane.analysis.quality import is_done
+from labcrane.analysis.quality import is_success
 from labcrane.analysis.report.factors import (
     BLOCK,
     CONDITION,
@@ -241,7 +241,7 @@ def practice_table(
 
 def practised(everything: "pd.DataFrame") -> "pd.DataFrame":
     """Return successful, shown movements including practice, with practice as a factor."""
-    done = everything[is_done(everything) & ~not_presented(everything)].copy()
+    done = everything[is_success(everything) & ~not_presented(everything)].copy()
     return done.assign(practice=practice_words(done))
 
 

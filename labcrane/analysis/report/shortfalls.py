@@ -6,7 +6,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.presented import not_presented
-from labcrane.analysis.quality import is_done, is_result
+from labcrane.analysis.quality import is_result, is_success
 from labcrane.analysis.report.factors import CONDITION, DISTANCE, GROUP, PHASE, PLACE, Factors
 from labcrane.analysis.report.outcomes import (
     ADJUSTED,
@@ -212,7 +212,7 @@ class _Design:
         self.measure, self.levels, self.people = measure, levels, people
         self._known = table.dropna(subset=[measure])
         self._done, self._recorded = table, recorded
-        self._unseen = recorded[is_done(recorded) & not_presented(recorded)]
+        self._unseen = recorded[is_success(recorded) & not_presented(recorded)]
         self.whole, self._empty = whole_people(table, measure, within)
         self._there = {
             name: [level for level in levels[name] if (self._known[name] == level).any()]

@@ -5,14 +5,16 @@ in docs/indicator.md.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import filterfalse
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.presented import not_presented, presented
 from labcrane.analysis.scoring.indicator import Indicator, Performance, indicate
 from labcrane.analysis.scoring.settings import COUNTS, RATINGS, TIME, IndicatorSettings
+from labcrane.core.records import UNDONE, Phase
 from labcrane.errors import LabcraneError, RecordingError
 from labcrane.recording.participant_file.reader import Recording, SessionRecord
 from labcrane.recording.participant_file.writer import DAMAGED
@@ -95,8 +97,8 @@ def operator_tests(
 ) -> list[OperatorTest]:
     """Return all tests of who is included, by operator, session and time.
 
-    Left out are tests without a reference, tests and references of which the operator was shown too
-    little, and damaged recordings; all others are scored.
+    Left out are skipped tests, tests without a reference, tests and references of which the
+    operator was shown too little, and damaged recordings; all others are scored.
 
     Parameters
     ----------
@@ -139,24 +141,22 @@ def _tests(
     reference: dict[str, list[float]] = {}
     lacking: dict[str, int] = {}
     unseen: list[str] = []
+    skipped: list[str] = []
     for number, session in zip(recording.sessions, recording, strict=True):
         trials = session.trials
         if not {TIME, *COUNTS.values()} <= set(trials.columns):
             continue
         shown = presented(session)
         failed = not_presented(trials if shown is None else shown)
-        unseen += [
-            f"trial {row['trial']:g} of session {number}"
-            for row in filter(_counts, trials[failed].to_dict("records"))
-        ]
+        unseen += _named(filter(_counts, trials[failed].to_dict("records")), number)
         rows = trials[~failed].to_dict("records")
         here: dict[str, list[float]] = {}
         for row in filter(_is_reference, rows):
             here.setdefault(_scene(row), []).append(float(row[TIME]))
         reference |= here  # the latest stage that there is, scenario by scenario
-        for row in rows:
-            if not _counts(row) or row.get("reference") == 1:
-                continue
+        tests = [row for row in rows if _counts(row) and row.get("reference") != 1]
+        skipped += _named(filter(_is_skipped, tests), number)
+        for row in filterfalse(_is_skipped, tests):
             times = reference.get(_scene(row), [])
             if not times:
                 lacking[_scene(row)] = lacking.get(_scene(row), 0) + 1
@@ -170,13 +170,23 @@ def _tests(
             f"saw or heard too little in {', '.join(unseen)}, which are not scored "
             "(presented: in the protocol)",
         )
+    if skipped:
+        leave_out(recording.participant, f"skipped {', '.join(skipped)}: nothing there to score")
     if lacking:
         leave_out(recording.participant, _without_reference(lacking, reference, recording))
 
 
 def _counts(row: Mapping[Any, Any]) -> bool:
     """Say whether a trial is a test or of the reference, and the attempt that holds."""
-    return bool(row["practice"] != 1 and row["outcome"] != "repeated")
+    return bool(row["practice"] != 1 and row["outcome"] not in UNDONE)
+
+
+def _is_skipped(row: Mapping[Any, Any]) -> bool:
+    return bool(row["outcome"] == Phase.SKIPPED)
+
+
+def _named(rows: Iterable[Mapping[Any, Any]], session: int) -> list[str]:
+    return [f"trial {row['trial']:g} of session {session}" for row in rows]
 
 
 def _scene(row: Mapping[Any, Any]) -> str:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from labcrane.analysis.presented import not_presented
-from labcrane.analysis.quality import is_done
+from labcrane.analysis.quality import is_success
+from labcrane.core.records import UNDONE
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -50,17 +51,17 @@ def time_outs(movements: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
     """Return for each condition the numbers of finished and unfinished trials, and their times.
 
     There is at least one column to go ``by``. ``seconds`` count from the trial's start, pauses left
-    out. Practice, repeated attempts and what was not shown are not in it; trials that were skipped
-    or ended by a person are counted as neither, and so are successes in which nothing moved.
+    out. Practice, attempts that are not the trial's last and what was not shown are not in it;
+    skipped trials are counted as neither, and so are successes in which nothing moved.
     """
     import pandas as pd
 
     own = movements[(movements["practice"].astype(float) == 0.0)].copy()
-    own = own[(own["outcome"] != "repeated") & ~not_presented(own)]
+    own = own[~own["outcome"].isin(UNDONE) & ~not_presented(own)]
     own["seconds"] = trial_seconds(own)
     rows = []
     for level, part in own.groupby(list(by)):
-        done, out = is_done(part), part["outcome"] == "timeout"
+        done, out = is_success(part), part["outcome"] == "timeout"
         judged = part[done | out]
         rows.append(
             {
@@ -73,7 +74,7 @@ def time_outs(movements: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
                 "mean_of_successes_s": float(part.loc[done, "seconds"].mean()),
                 "median_with_time_outs_s": median_time(
                     judged["seconds"].to_numpy(float),
-                    np.asarray(is_done(judged), np.float64),
+                    np.asarray(is_success(judged), np.float64),
                 ),
             }
         )
