@@ -1,13 +1,14 @@
 """Every column of a participant's tables, with its unit and its source."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.gaze import FIXATIONS, gaze_units
 from labcrane.analysis.presented import PRESENTED
 from labcrane.analysis.questionnaires import ANSWERS, MEANING, SCORES, asked_in, score_column
 from labcrane.analysis.tables.definitions import MEASURES
+from labcrane.core.items import Item
 from labcrane.recording.frame_log import LOOP
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.recording.trial_columns import OWN
@@ -107,7 +108,7 @@ def _asked(sessions: Sequence[SessionRecord]) -> dict[str, str]:
     meanings: dict[str, str] = {}
     for session in sessions:
         for name, about in asked_in(session).items():
-            items = {f"{name}.{item['name']}": str(item["text"]) for item in about["items"]}
+            items = {f"{name}.{item['name']}": _meaning(item) for item in about["items"]}
             scores = {
                 score_column(name, score["name"], items): f"score {score['name']} of {name}, "
                 f"{score['lowest']:g} to {score['highest']:g}"
@@ -115,6 +116,11 @@ def _asked(sessions: Sequence[SessionRecord]) -> dict[str, str]:
             }
             meanings |= items | scores
     return meanings
+
+
+def _meaning(item: Mapping[str, Any]) -> str:
+    """Return an item's wording and its possible answers, with what they mean."""
+    return f"{item['text']} ({Item(**item).takes})"
 
 
 def questionnaire_codebook(sessions: Sequence[SessionRecord]) -> "pd.DataFrame":
@@ -129,7 +135,7 @@ def questionnaire_codebook(sessions: Sequence[SessionRecord]) -> "pd.DataFrame":
     for session in sessions:
         for name, about in asked_in(session).items():
             rows += [
-                ("questionnaires.item", f"{name}.{item['name']}", "", item["text"], WRITTEN)
+                ("questionnaires.item", f"{name}.{item['name']}", "", _meaning(item), WRITTEN)
                 for item in about["items"]
             ]
             rows += [

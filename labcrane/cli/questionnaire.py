@@ -24,9 +24,11 @@ class Sheet:
 
     @staticmethod
     def read(item: Item, said: str) -> float | str | None:
-        """Return the typed answer, not yet checked; a dash declines."""
+        """Return the typed answer, not yet checked; a choice by its label; a dash declines."""
         if said == "-":
             return None
+        if item.kind == "choice" and said not in item.choices:
+            return dict(zip(item.labels, item.choices, strict=False)).get(said, said)
         if item.kind in {"choice", "text"}:
             return said
         try:

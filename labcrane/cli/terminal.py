@@ -19,6 +19,7 @@ from labcrane.core.roles import Questionnaire
 from labcrane.design.counts import TrialCounts
 from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.standing import SessionStage, Standing
+from labcrane.web.translations import ENGLISH, Words
 
 KEYS: Mapping[str, Order] = {
     " ": Order.START,
@@ -70,6 +71,8 @@ class Terminal:
         Names and number of the session's trials.
     keys
         Whether to listen at all; a simulated session needs no person.
+    words
+        Wording of questionnaires, in the language of the participant's page.
     alone
         Whether only the terminal gives orders, as there is no page.
     """
@@ -82,12 +85,14 @@ class Terminal:
         *,
         keys: bool,
         questionnaires: Mapping[str, Questionnaire] | None = None,
+        words: Words = ENGLISH,
         alone: bool = False,
     ) -> None:
         self._standing = Standing()
         self._alone = alone
         self._sheets = Sheets(questionnaires or {})
         self._sheet: Sheet | None = None
+        self._words = words
         self._console = console
         self._out = out
         self._counts = counts
@@ -198,14 +203,15 @@ class Terminal:
             return
         for item in sheet.items():
             while True:
-                said = self._ask(f"{item.text} ({item.takes}; - declines, empty leaves): ")
+                takes = self._words.takes(item)
+                said = self._ask(f"{item.text} ({takes}; - declines, empty leaves): ")
                 if not said:
                     self._progress.print("left; q begins again")
                     return
                 try:
                     answer = item.check(sheet.read(item, said))
                 except AnswerError as error:
-                    self._progress.print(str(error), markup=False)
+                    self._progress.print(self._words.refused(str(error), item), markup=False)
                     continue
                 self._console.give(Command(Order.ANSWER, sheet.answer(item, answer)))
                 break

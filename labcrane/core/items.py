@@ -78,8 +78,7 @@ class Item:
         span = f"{self.lowest:g} to {self.highest:g}"
         if self.step:
             span += f" in steps of {self.step:g}"
-        said = ", ".join(f"{at:g} {words}" for at, words in self.worded.items())
-        return f"{span}: {said}" if said else span
+        return f"{span}: {self.meanings}" if self.meanings else span
 
     @property
     def steps(self) -> int:
@@ -107,6 +106,13 @@ class Item:
     def worded(self) -> Mapping[float, str]:
         """The words of the answers that have some."""
         return {self.nearest(at): words for at, words in self.words}
+
+    @property
+    def meanings(self) -> str:
+        """What answers of a scale mean, its ends among them: ``0 Good, 100 Poor``."""
+        ends = {self.lowest: self.left, self.highest: self.right}
+        said = sorted((ends | dict(self.worded)).items())
+        return ", ".join(f"{at:g} {words}" for at, words in said if words)
 
     def check(self, answer: object) -> Value:
         """Return an answer as it is recorded, a number as its step; None declines the item.

@@ -141,6 +141,10 @@ class Form:
         with card:
             with ui.element("p").props(f'id="asked-{item.name}"'):
                 ui.label(item.text)
+            if item.left or item.right:
+                with ui.element("div").classes("form-ends"):
+                    ui.label(item.left)
+                    ui.label(item.right)
             if item.kind == "choice":
                 self._choices(
                     name, item, dict(zip(item.choices, item.labels or item.choices, strict=True))
@@ -166,10 +170,6 @@ class Form:
     ) -> None:
         from nicegui import ui  # noqa: PLC0415
 
-        if item.left or item.right:
-            with ui.element("div").classes("form-ends"):
-                ui.label(item.left)
-                ui.label(item.right)
         fine = " form-fine" if len(values) > FEW_TICKS else ""
         scale = f"form-scale{fine}" if item.kind == "scale" else "form-choices"
         if item.words:

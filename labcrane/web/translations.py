@@ -37,7 +37,9 @@ class Phrases:
         if item.kind == "text":
             return self.text
         span = self.span.format(low=f"{item.lowest:g}", high=f"{item.highest:g}")
-        return self.stepped.format(span=span, step=f"{item.step:g}") if item.step else span
+        if item.step:
+            span = self.stepped.format(span=span, step=f"{item.step:g}")
+        return f"{span}: {item.meanings}" if item.meanings else span
 
     def refused(self, why: str, item: Item | None) -> str:
         """Return why an answer was not accepted; ``why`` is in the record's language, English."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis import Participant, asked_in, scores_of
+from labcrane.core import Item
 from labcrane_bids.files import label, write_json, write_tsv
 
 if TYPE_CHECKING:
@@ -253,6 +254,6 @@ def _item(item: Mapping[str, Any]) -> dict[str, Any]:
         about["Levels"] = dict(zip(item["choices"], labels, strict=True))
     elif item["kind"] in {"scale", "number"}:
         about |= {"Minimum": item["lowest"], "Maximum": item["highest"]}
-        if item["left"] or item["right"]:
-            about["Description"] += f" ({item['left']} to {item['right']})"
+        if meanings := Item(**item).meanings:
+            about["Description"] += f" ({meanings})"
     return about

@@ -6,7 +6,9 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
+from random import Random
 
 import pytest
 from needs import needs
@@ -15,9 +17,10 @@ from rich.console import Console
 
 from labcrane import open_recording
 from labcrane.cli.terminal import Terminal
-from labcrane.core import Event
+from labcrane.core import Event, Item
 from labcrane.design.counts import TrialCounts
 from labcrane.session.commands import Command, Order, QueueConsole
+from labcrane.web.translations import WORDS
 
 
 class TerminalUser:
@@ -119,6 +122,79 @@ def test_an_interrupt_from_the_keyboard_ends_the_session_in_order(folder: Path) 
     assert session.events["data"].tolist()[-1]["reason"] == "by order"
 
 
+FORMS = """page: {language: de}
+questionnaires:
+  q: {use: nasa_tlx, file: q.yaml}
+  about: {use: demographics, language: de, ask: [sex, handedness]}
+sessions:"""
+TLX_DE = """\
+rights: public domain
+title: Belastung
+left: gering
+right: hoch
+performance: [gut, schlecht]
+pair: Was zählte mehr, {one} oder {other}?
+items:
+  - "Geistig: a"
+  - "Körperlich: b"
+  - "Zeitlich: c"
+  - "Leistung: d"
+  - "Anstrengung: e"
+  - "Frust: f"
+"""
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_prompt_shows_the_ends_of_a_scale_in_every_language(seed: int) -> None:
+    random = Random(seed)
+    low, steps, step = random.randint(-5, 5), random.randint(1, 50), random.choice([0.5, 1, 5])
+    item = Item("a", "A?", "scale", low, low + steps * step, step, "gut", "schlecht")
+    at = random.randint(0, steps)
+    worded = replace(item, left="", words=((low + at * step, "mitten drin"),))
+    for words in WORDS.values():
+        said = words.takes(item)
+        assert said.endswith(f": {low:g} gut, {low + steps * step:g} schlecht")
+        assert f"{low + at * step:g} mitten drin" in words.takes(worded)
+        refused = words.refused(f"not one of {item.takes}", item)
+        assert f"{low:g} gut, " in refused
+
+
+@pytest.mark.slow
+@needs("terminals")
+def test_the_terminal_asks_as_the_page_does_and_takes_the_labels_that_it_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")  # so that no prompt is broken into two lines
+    (tmp_path / "q.yaml").write_text(TLX_DE, encoding="utf-8")
+    study = SHORT.replace("sessions:", FORMS).replace(
+        "{use: dual_joystick}", "{use: simulated_operator}"
+    )
+    study = study.replace("- block: {task: aiming, pairs: 1}", "- questionnaire: [q, about]")
+    (tmp_path / "study.yaml").write_text(study, encoding="utf-8")
+    command = [sys.executable, "-m", "labcrane", "run", "study.yaml", "--no-page"]
+    user = TerminalUser([*command, "--participant", "P002", "--local", "--pilot"], tmp_path)
+    user.until("questionnaire: ")
+    user.press("q")
+    for ends in ("gering, 100 hoch",) * 3:
+        user.until(f"0 bis 100 in Schritten von 5: 0 {ends}")
+        user.press("90\r")
+    user.until("0 bis 100 in Schritten von 5: 0 gut, 100 schlecht")
+    user.press("101\r")
+    user.until("Möglich ist 0 bis 100 in Schritten von 5: 0 gut, 100 schlecht")
+    user.press("10\r5\r5\r")
+    user.until("questionnaire: Zu Ihrer Person")
+    user.press("q")
+    user.until("eines von weiblich")
+    user.press("weiblich\r")
+    user.until("Mit welcher Hand")
+    user.press("\re")
+    user.leave()
+    answers = open_recording(tmp_path / "data/P002-PILOT/P002-PILOT.h5").session(1).questionnaires
+    given = answers[answers["kind"] == "answer"].set_index("item")
+    assert given["value"]["performance"] == 10.0
+    assert given["text"]["sex"] == "female"
+
+
 @pytest.mark.slow
 @needs("terminals")
 def test_a_questionnaire_is_filled_in_at_the_terminal(tmp_path: Path) -> None:
@@ -132,7 +208,7 @@ def test_a_questionnaire_is_filled_in_at_the_terminal(tmp_path: Path) -> None:
     user.press("q")
     user.until("- declines, empty leaves")
     user.press("11\r")
-    user.until("item 'rating' takes 0 to 10 in steps of 1, not 11.0")
+    user.until("not 11.0")
     user.press("7\r")
     user.until("questionnaire: Situational awareness")
     user.press("q-\r")

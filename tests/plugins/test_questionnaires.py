@@ -165,7 +165,9 @@ def test_a_missing_answer_leaves_only_the_scores_that_do_not_need_it() -> None:
 @pytest.mark.parametrize("answer", [103.0, -5.0, 52.0, float("nan"), "70", True])
 def test_an_answer_off_the_scale_is_refused_with_what_is_possible(answer: object) -> None:
     item = BUILT["nasa_tlx"].items()[0]
-    with pytest.raises(AnswerError, match=r"item 'mental' takes 0 to 100 in steps of 5, not "):
+    with pytest.raises(
+        AnswerError, match=r"item 'mental' takes 0 to 100 in steps of 5: 0 Low, 100 High, not "
+    ):
         item.check(answer)
 
 

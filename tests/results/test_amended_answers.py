@@ -183,9 +183,9 @@ def test_a_column_means_the_same_for_everyone(exports: Path) -> None:
         assert not np.isclose(rated["movement_time"], 9).any()
     book = pd.read_csv(exports / "tables" / "codebook.csv").query("table == 'trials'")
     told = book.set_index("column")["description"]
-    assert told["a_b_c"] == "A?"
-    assert told["a_b_c_2"] == "B?"
-    assert told["movement_time_2"] == "How long?"
+    asked = {"a_b_c": "A?", "a_b_c_2": "B?", "movement_time_2": "How long?"}
+    for column, text in asked.items():
+        assert told[column] == f"{text} (0 to 10 in steps of 1)"
     assert set(told.index) == set(trials)
 
 

@@ -183,7 +183,8 @@ def test_every_question_is_in_the_codebook_and_every_column_in_psych_ds(exports:
     for name in ("questionnaires", "scores"):
         columns = pd.read_csv(exports / "tables" / f"{name}.csv").columns
         assert set(columns) <= set(book.loc[name].index)
-    assert book.loc[("questionnaires.item", "comfort_heat"), "description"] == "Too hot?"
+    said = book.loc[("questionnaires.item", "comfort_heat"), "description"]
+    assert said == "Too hot? (0 to 10 in steps of 1)"
     about = json.loads(
         (exports / "psychds" / "dataset_description.json").read_text(encoding="utf-8")
     )

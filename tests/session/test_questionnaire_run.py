@@ -57,7 +57,7 @@ def test_a_wrong_answer_is_refused_with_what_is_possible_and_a_right_one_follows
     seen = play(ratings(tmp_path), wrong, SUBMIT, right, SUBMIT)
     why = [event.data["why"] for event in seen.events("questionnaire.refused")]
     assert why == [
-        "item 'rating' takes 0 to 10 in steps of 1, not 11",
+        "item 'rating' takes 0 to 10 in steps of 1: 0 Not at all, 10 Perfectly, not 11",
         "rating have no answer; answer or decline them",
     ]
     end = seen.events("questionnaire.end")[0].data

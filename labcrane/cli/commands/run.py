@@ -212,6 +212,7 @@ def _launch(visit: "Visit", *, page: bool) -> None:
     from labcrane.processes.real_time import reserved_core
     from labcrane.registry.offers import LAB, not_installed
     from labcrane.session.commands import QueueConsole
+    from labcrane.web.translations import WORDS
 
     _check(visit)
     needs = {"pylsl": LAB, **({"nicegui": LAB} if page else {})}
@@ -220,13 +221,17 @@ def _launch(visit: "Visit", *, page: bool) -> None:
     ask_for_consent(visit, page=page)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
-    keys, asked = not visit.simulated, visit.study.questionnaires
-    shown, counts = out.console, TrialCounts.of(plan)
     with (
         # Before any other process is started: they must not use that core.
         reserved_core() if visit.real_time else nullcontext() as core,
         Terminal(
-            console, shown, counts, keys=keys, questionnaires=asked, alone=not page
+            console,
+            out.console,
+            TrialCounts.of(plan),
+            keys=not visit.simulated,
+            questionnaires=visit.study.questionnaires,
+            words=WORDS[visit.study.protocol.page.language],
+            alone=not page,
         ) as terminal,
     ):
         visit = replace(visit, core=core)
