@@ -16,7 +16,14 @@ from labcrane_bids.dataset import (
 )
 from labcrane_bids.eeg import eeg_description, write_eeg
 from labcrane_bids.events import event_description, event_table, screen_of
-from labcrane_bids.files import first_tick, label, write_bare_tsv, write_json, write_tsv
+from labcrane_bids.files import (
+    Labels,
+    first_tick,
+    label,
+    write_bare_tsv,
+    write_json,
+    write_tsv,
+)
 from labcrane_bids.motion import TrackingSystem, tracking_systems
 from labcrane_bids.phenotype import Phenotype, demographics_of
 from labcrane_bids.physio import continuous_recordings, left_out
@@ -47,6 +54,7 @@ class Bids(Exporter):
         self._settings = settings
         self._machine = machine
         self._without: set[str] = set()
+        self._labels = Labels()
 
     def export(self, participants: Iterable[Participant], folder: Path) -> None:
         rows, contexts = [], []
@@ -85,7 +93,7 @@ class Bids(Exporter):
 
         (at / "motion").mkdir(parents=True)
         context = session.context
-        task = label(str(context.get("session_name", "")) or "crane")
+        task = label(str(context.get("session_name", ""))) or "crane"
         named = f"{stem}_task-{task}"
         zero = first_tick(session)
         scans = []
@@ -99,12 +107,13 @@ class Bids(Exporter):
         write_json(at / "motion" / f"{named}_events.json", about)
         streams = eeg_streams(session)
         for stream in streams:
-            which = f"_acq-{label(stream.name)}" if len(streams) > 1 else ""
+            which = f"_acq-{self._labels(stream.name)}" if len(streams) > 1 else ""
             path = at / "eeg" / f"{named}{which}_eeg"
             signal = write_eeg(path, stream, session, events, task, self._settings)
             write_json(path.with_name(f"{named}{which}_events.json"), eeg_description(about))
             scans.append((f"eeg/{path.name}.vhdr", float(signal.time[0] - zero)))
-        for recording, samples, description in continuous_recordings(session, self._settings):
+        recordings = continuous_recordings(session, self._settings, self._labels)
+        for recording, samples, description in recordings:
             (at / "beh").mkdir(exist_ok=True)
             path = at / "beh" / f"{named}_recording-{recording}_physio"
             write_bare_tsv(path.with_name(f"{path.name}.tsv.gz"), samples)

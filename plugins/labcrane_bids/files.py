@@ -2,7 +2,9 @@
 
 import gzip
 import json
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -17,6 +19,9 @@ if TYPE_CHECKING:
 
 MISSING = "n/a"
 
+EYE = re.compile(r"eye\d+", re.IGNORECASE)
+"""Labels that BIDS keeps for recordings of eyes."""
+
 ROWS = 1 << 16
 """Samples that are in memory at a time."""
 
@@ -24,6 +29,35 @@ ROWS = 1 << 16
 def label(text: str) -> str:
     """Return a value of an entity: letters and digits only."""
     return "".join(letter for letter in text if letter.isascii() and letter.isalnum())
+
+
+class Labels:
+    """Labels of streams or questionnaires, one for each name; no two differ in case alone.
+
+    One object serves a whole data set, so that a name has one label in all its sessions.
+
+    Parameters
+    ----------
+    called
+        What a name is called as long as no other one is.
+    fallback
+        What a name without ASCII letters or digits is called.
+    """
+
+    def __init__(self, called: Callable[[str], str] = label, fallback: str = "stream") -> None:
+        self._called, self._fallback = called, fallback
+        self._given: dict[str, str] = {}
+
+    def __call__(self, name: str) -> str:
+        """Return the label of a name."""
+        if name not in self._given:
+            first = self._called(name) or self._fallback
+            taken = {each.lower() for each in self._given.values()}
+            numbered = chain([first], (f"{first}x{number}" for number in count(2)))
+            self._given[name] = next(
+                each for each in numbered if each.lower() not in taken and not EYE.fullmatch(each)
+            )
+        return self._given[name]
 
 
 def first_tick(session: SessionRecord) -> float:

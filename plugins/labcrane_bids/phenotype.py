@@ -6,18 +6,19 @@ answered more often is in ``beh`` instead: one table per session, one row per ti
 
 import json
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis import Participant, asked_in, scores_of
 from labcrane.core import Item
-from labcrane_bids.files import label, write_json, write_tsv
+from labcrane_bids.files import Labels, label, write_json, write_tsv
 
 if TYPE_CHECKING:
     import pandas as pd
 
 PHENOTYPE = "phenotype"
+FALLBACK = "questionnaire"
 DEMOGRAPHICS = "demographics "
 """How the version of such a questionnaire begins: with its offer."""
 
@@ -77,22 +78,22 @@ class Phenotype:
         """Write the tables; return what they would be called in ``phenotype``."""
         import pandas as pd
 
-        tasks = _all_different(self._rows, label)
-        tables = _all_different(self._rows, label_of)
+        task_of, table_of = Labels(fallback=FALLBACK), Labels(label_of, FALLBACK)
+        tables = [table_of(name) for name in self._rows]
         for name, rows in self._rows.items():
             table = pd.DataFrame(rows)
             for column in ("block", "trial"):
                 table[column] = table[column].astype("Int64")
             about = self._described(name, list(map(str, table)))
             if table["participant_id"].duplicated().any():
-                about = {"TaskName": tasks[name], "TaskDescription": self._title(name), **about}
-                _write_repeated(folder, f"task-{tasks[name]}_beh", table, about)
+                about = {"TaskName": task_of(name), "TaskDescription": self._title(name), **about}
+                _write_repeated(folder, f"task-{task_of(name)}_beh", table, about)
                 continue
             (folder / PHENOTYPE).mkdir(exist_ok=True)
-            write_tsv(folder / PHENOTYPE / f"{tables[name]}.tsv", table)
+            write_tsv(folder / PHENOTYPE / f"{table_of(name)}.tsv", table)
             about = {"MeasurementToolMetadata": {"Description": self._title(name)}, **about}
-            write_json(folder / PHENOTYPE / f"{tables[name]}.json", about)
-        return list(tables.values())
+            write_json(folder / PHENOTYPE / f"{table_of(name)}.json", about)
+        return tables
 
     def _title(self, name: str) -> str:
         return str(self._about.get(name, {}).get("title") or name)
@@ -136,20 +137,6 @@ def _write_repeated(
         own = rows.drop(columns=["participant_id", "session_id"])
         write_tsv(beh / f"{subject}_{session}_{stem}.tsv", own)
     write_json(folder / f"{stem}.json", {k: v for k, v in about.items() if k != "session_id"})
-
-
-def _all_different(names: Iterable[str], called: Callable[[str], str]) -> dict[str, str]:
-    """Return what each questionnaire is called in the name of a file, upper and lower case apart.
-
-    BIDS takes letters and digits alone, so that ``mood-1`` and ``mood1`` would be one file.
-    """
-    files: dict[str, str] = {}
-    for name in names:
-        file = called(name) or "questionnaire"
-        while file.lower() in map(str.lower, files.values()):
-            file += "x"
-        files[name] = file
-    return files
 
 
 def _column(item: str) -> str:

@@ -1,6 +1,6 @@
 """Physio: gaze and other streams of numbers at a rate, each as a recording of its own."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from labcrane import FloatArray
 from labcrane.analysis import eeg_streams, gaze_space
 from labcrane.recording import SessionRecord, Stream
-from labcrane_bids.files import MISSING, ROWS, first_tick, label
+from labcrane_bids.files import MISSING, ROWS, first_tick
 from labcrane_bids.settings import BidsSettings
 
 GAZE = "Gaze"
@@ -28,7 +28,7 @@ with the head."""
 
 
 def continuous_recordings(
-    session: SessionRecord, settings: BidsSettings
+    session: SessionRecord, settings: BidsSettings, label: Callable[[str], str]
 ) -> Iterator[tuple[str, Iterator[list[FloatArray]], dict[str, Any]]]:
     """Yield recording label, samples and description of each stream except EEG."""
     zero = first_tick(session)
@@ -83,6 +83,7 @@ def _recording(
         "SamplingFrequency": rate_hz,
         "StartTime": float(stream.column("time", 0, 1)[0] - zero) if len(stream) else 0.0,
         "Columns": columns,
+        "Description": f"LSL stream {stream.name}",
         "PhysioType": "eyetrack" if place else "generic",  # BIDS has no eyes without a place
         "Manufacturer": str(stream.attrs.get("source_id", MISSING)) or MISSING,
     }

@@ -70,6 +70,7 @@ def record(
     stated: Sequence[str] = ("screen",),
     eeg: bool = False,
     shown: Mapping[str, Callable[[float], FloatArray]] | None = None,
+    others: Sequence[str] = (),
 ) -> Path:
     """Record session 1; a program takes the controls, whatever the stamps say.
 
@@ -77,7 +78,8 @@ def record(
     somewhere in the window, beside the areas that a view has shown there; or, as a function of
     times on the session's clock, of eyes whose place in the window is known, in pixels. ``stated``
     has the coordinate system that the header of each stream in pixels states. ``shown`` says when
-    each view showed its pictures, by its name, in a session that ended at that time.
+    each view showed its pictures, by its name, in a session that ended at that time. ``others`` are
+    names of streams at 25 Hz, each of which holds its own number.
     """
     visit = Visit(chosen, participant, 1, data, simulated=simulated, fast=True, pilot=pilot)
     plan = plan_session(chosen, participant, 1)
@@ -91,7 +93,7 @@ def record(
             log.note(Event("session.start", clock.now(), context(visit, plan, rig, run)))
             loop.run(rig, run, sequencer, clock, ScriptedConsole(orders), log, [])
     journals = [visit.journal]
-    if gaze or eeg or shown:
+    if gaze or eeg or shown or others:
         journals.append(visit.streams_journal)
         with XdfWriter(visit.streams_journal) as writer:
             if gaze is True:
@@ -102,6 +104,12 @@ def record(
                 _gaze_in_window(writer, clock.now(), gaze, stated)
             for name, pictures in (shown or {}).items():
                 _pictures(writer, name, pictures(clock.now()))
+            for number, name in enumerate(others):
+                header = StreamHeader(
+                    name, "EDA", (Channel("a", "uS"),), "float32", 25.0, f"n{number}"
+                )
+                time = np.arange(95.0, clock.now(), 0.04)
+                _stream(writer, header, time, 0.0, np.full((len(time), 1), number, np.float32))
             if eeg:
                 events = read_xdf(visit.journal).stream(EVENTS).stamps
                 _eeg(writer, clock.now(), events)

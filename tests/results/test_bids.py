@@ -3,8 +3,10 @@
 import gzip
 import io
 import json
+import re
 import shutil
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pandas as pd
@@ -17,6 +19,7 @@ from labcrane.analysis.measures import measures_of
 from labcrane.design.plan import plan_session
 from labcrane.testing import ch8
 from labcrane_bids.bids import Bids
+from labcrane_bids.files import Labels
 from labcrane_bids.settings import BidsSettings
 from results.consumers import bids_errors, under
 from results.recorded import STUDY, record, study
@@ -219,3 +222,44 @@ def test_a_table_of_people_without_pseudonyms_is_refused_in_words(tmp_path: Path
     people = BidsSettings(people=tmp_path / "people.csv")
     with pytest.raises(ProtocolError, match="has no column 'participant'; its columns are none"):
         Bids(people, ch8()).export([], tmp_path)
+
+
+ALIKE = (
+    "Bio EDA",
+    "Bio_EDA",
+    "bioEDA",
+    "Polar H10 12",
+    "Polar H1 012",
+    "心電図",
+    "脈拍",
+    "eye1",
+    "+",
+)
+
+
+@needs("bids-validator-deno")
+@pytest.mark.slow
+def test_streams_of_names_that_look_alike_are_files_of_their_own(tmp_path: Path) -> None:
+    record(study(tmp_path), tmp_path / "data", "P001", gaze=True, others=ALIKE)
+    out = tmp_path / "out"
+    out.mkdir()
+    Bids(BidsSettings(), ch8()).export(find_cohort(tmp_path / "data").included, out)
+    found = {}
+    for path in out.rglob("*_physio.json"):
+        about = json.loads(path.read_text(encoding="utf-8"))
+        samples = np.loadtxt(path.with_suffix(".tsv.gz"))
+        found[about["Description"].removeprefix("LSL stream ")] = set(samples[:, -1])
+    assert found.pop("eyes") == {0.0, 1.0}
+    assert found == {name: {number} for number, name in enumerate(ALIKE)}
+    assert bids_errors(out) == []
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_every_name_has_a_label_of_its_own_and_keeps_it(seed: int) -> None:
+    random = Random(seed)
+    names = ["".join(random.choices("aAbB1 _-.é心", k=random.randint(1, 3))) for _ in range(200)]
+    labels = Labels()
+    given = {name: labels(name) for name in names}
+    assert all(re.fullmatch("[A-Za-z0-9]+", label) for label in given.values())
+    assert len({label.lower() for label in given.values()}) == len(given)
+    assert all(labels(name) == label for name, label in given.items())
