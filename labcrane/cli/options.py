@@ -7,56 +7,25 @@ from typing import Annotated
 import typer
 
 from labcrane.errors import ProtocolError
+from labcrane.files.study_folder import DATA, data_of, protocol_of
 
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON, for scripts")]
-PROTOCOL_FILE = "protocol.yaml"
-DATA = "data"
-YAML = (".yaml", ".yml")
 STUDY = "the study: its folder, its protocol or its data folder"
 
 
 def protocol_in(path: Path | None) -> Path | None:
-    """Return a study's file where a study was given, as of :func:`protocol_of`."""
+    """Return a study's file where a study was given."""
     return None if path is None else protocol_of(path)
 
 
-def protocol_of(path: Path) -> Path:
-    """Return a study's file where its folder was given, or the data folder in it.
-
-    Raises
-    ------
-    ProtocolError
-        A folder was given, and there is none in it.
-    """
-    if not path.is_dir():
-        return path
-    if (inside := path / PROTOCOL_FILE).is_file():
-        return inside
-    beside = path.absolute().parent / PROTOCOL_FILE
-    if path.absolute().name == DATA and beside.is_file():
-        return beside
-    raise ProtocolError(
-        f"there is no {PROTOCOL_FILE} in {path.absolute()}; give the study's YAML file, or a "
-        f"folder with {PROTOCOL_FILE}"
-    )
-
-
 def data_in(path: Path | None) -> Path | None:
-    """Return a study's data folder where the study's folder or its protocol was given."""
-    if path is None:
-        return None
-    if path.suffix in YAML and path.is_file():
-        return path.parent / DATA
-    if (path / PROTOCOL_FILE).is_file():
-        return path / DATA
-    return path
+    """Return a study's data folder where a study was given."""
+    return None if path is None else data_of(path)
 
 
 def data_here() -> Path:
     """Return the data folder of the study whose folder this is; this one where it is the data."""
-    here = Path().absolute()
-    inside = here.name == DATA and (here.parent / PROTOCOL_FILE).is_file()
-    return Path() if inside or Path("register").is_dir() else Path(DATA)
+    return data_of(Path())
 
 
 def one_study(data: Path | None, study: Path | None = None) -> Path:

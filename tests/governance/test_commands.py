@@ -234,6 +234,7 @@ def test_a_study_is_where_you_are_or_its_folder_its_protocol_or_its_data(
 def test_a_study_that_is_given_twice_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    (tmp_path / "data").mkdir()
     words = ("participants", str(tmp_path), "--data", str(tmp_path))
     assert "was given twice" in say(capsys, *words, status=2)
 

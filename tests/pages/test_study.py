@@ -24,7 +24,7 @@ from labcrane.errors import RecordingError
 from labcrane.participants.enrolment import exclude, note
 from labcrane.participants.register import Sitting, changed
 from labcrane.session.commands import Command, Order
-from labcrane.web.study.overview import Overview, Reader, checked_data
+from labcrane.web.study.overview import Overview, Reader
 from labcrane.web.study.study_page import page_of, size
 
 SECOND = "  - name: later\n    after_days: [7, 9]\n    steps:\n      - block: {{task: aiming}}\n"
@@ -59,7 +59,7 @@ def sat_on(lab: Lab, day: date) -> None:
 
 
 def overview(lab: Lab, today: date = TODAY) -> Overview:
-    return Reader(*checked_data(lab.folder)).overview(today)
+    return Reader.of(lab.folder).overview(today)
 
 
 @pytest.mark.slow
@@ -146,7 +146,7 @@ def test_a_file_is_read_again_only_when_it_has_changed(
     read: list[str] = []
     measure = module.loop_quality
     monkeypatch.setattr(module, "loop_quality", lambda own: read.append(own.name) or measure(own))
-    reader = Reader(*checked_data(lab.folder))
+    reader = Reader.of(lab.folder)
     first = reader.overview(TODAY)
     assert sorted(read) == ["P001", "P002", "P003"]
     assert reader.overview(TODAY).people == first.people
@@ -167,10 +167,10 @@ def test_what_people_wrote_is_text_on_the_page_and_no_markup(lab: Lab) -> None:
 
 def test_an_empty_folder_and_none_say_what_to_do(tmp_path: Path) -> None:
     (tmp_path / "data").mkdir()
-    page = page_of(Reader(*checked_data(tmp_path)).overview(TODAY), TODAY, "now")
+    page = page_of(Reader.of(tmp_path).overview(TODAY), TODAY, "now")
     assert "No participants are enrolled yet." in page
-    with pytest.raises(RecordingError, match="give a study's folder, or the data folder in it"):
-        checked_data(tmp_path / "nowhere")
+    with pytest.raises(RecordingError, match="give the study's folder, its protocol or its data"):
+        Reader.of(tmp_path / "nowhere")
 
 
 @pytest.mark.parametrize(

@@ -79,7 +79,7 @@ def test_a_folder_stands_for_its_protocol(
     assert "warning" not in said.out + said.err
     assert main(["check", str(tmp_path)]) == 2
     assert (
-        f"there is no protocol.yaml in {tmp_path}; give the study's YAML" in capsys.readouterr().err
+        f"there is no protocol.yaml in {tmp_path}, nor another protocol" in capsys.readouterr().err
     )
 
 

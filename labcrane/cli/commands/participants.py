@@ -16,10 +16,10 @@ from labcrane.cli.options import (
     data_in,
     first_study,
     one_study,
-    protocol_of,
     stay_on_this_computer,
 )
 from labcrane.cli.output import out, print_rows, whole_table
+from labcrane.files.study_folder import protocol_of
 
 if TYPE_CHECKING:
     from labcrane.participants.folders import Places
@@ -206,7 +206,6 @@ def study(
         typer.Argument(
             metavar="STUDY",
             help=STUDY,
-            callback=lambda path: path.parent if path.is_file() else path,
             default_factory=Path,
             show_default="here",
         ),
@@ -222,11 +221,11 @@ def study(
         raise PluginError(f"the study's page {missing}")
     from labcrane.web.handle import free_port
     from labcrane.web.server.serving import HOST
-    from labcrane.web.study.overview import Reader, checked_data
+    from labcrane.web.study.overview import Reader
     from labcrane.web.study.service import serve
 
     stay_on_this_computer()
-    reader = Reader(*checked_data(folder))
+    reader = Reader.of(folder)
     reader.overview(today())  # what cannot be read is said here, not in a browser
     out.print("Ctrl-C ends it", markup=False)
     serve(reader, discover, free_port(HOST, port), lambda line: out.print(line, markup=False))

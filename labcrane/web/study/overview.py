@@ -12,7 +12,8 @@ from labcrane.analysis.cohort import Participant, Status, everyone, unfinished
 from labcrane.analysis.quality import loop_quality, sync_quality
 from labcrane.approval.lock import lock_path, read_lock
 from labcrane.core.findings import Verdict
-from labcrane.errors import LabcraneError, ProtocolError, RecordingError
+from labcrane.errors import LabcraneError, ProtocolError
+from labcrane.files.study_folder import data_of, protocol_of
 from labcrane.files.yaml import parse_yaml
 from labcrane.participants.deviations import all_deviations
 from labcrane.participants.folders import Places
@@ -185,6 +186,15 @@ class Reader:
     protocol: Path | None = None
     _kept: dict[Path, tuple[tuple[int, int], tuple[Sat, ...]]] = field(default_factory=dict)
 
+    @classmethod
+    def of(cls, study: Path) -> "Reader":
+        """Return the reader of a study: of its folder, its protocol or its data folder."""
+        data = data_of(study)
+        try:
+            return cls(data, protocol_of(study))
+        except ProtocolError:  # data alone
+            return cls(data)
+
     def overview(self, today: date) -> Overview:
         """Return the study as it stands.
 
@@ -195,7 +205,7 @@ class Reader:
         """
         places = Places(self.data)
         register = read(places)
-        recorded = everyone(self.data, struck(places))
+        recorded = everyone(self.data, struck(places)) if self.data.is_dir() else []
         text = self._text(recorded)
         planned = _planned(text)
         version = self._consent_version()
@@ -217,7 +227,7 @@ class Reader:
             for person in people
         ]
         used = sum(path.stat().st_size for path in places.files())
-        free = shutil.disk_usage(self.data).free
+        free = shutil.disk_usage(self.data if self.data.is_dir() else self.data.parent).free
         sessions = sum(len(person.sat) for person in people)
         return Overview(
             study=str(text.get("title") or text.get("study") or register.study or self.data.name),
@@ -402,21 +412,3 @@ def newest_report(register: Register) -> Path | None:
     """Return the path of the latest report, if it still exists."""
     made = [Path(one.folder) for one in register.exports if one.exporter == "report"]
     return next((folder for folder in reversed(made) if (folder / "report.html").is_file()), None)
-
-
-def checked_data(folder: Path) -> tuple[Path, Path | None]:
-    """Return the data folder and the protocol of what was given: a study's folder, or its data.
-
-    Raises
-    ------
-    RecordingError
-        It is neither.
-    """
-    beside = folder if (folder / "data").is_dir() else folder.parent
-    data = folder / "data" if (folder / "data").is_dir() else folder
-    if not data.is_dir():
-        raise RecordingError(
-            f"there is no folder {folder}; give a study's folder, or the data folder in it"
-        )
-    protocol = beside / "protocol.yaml"
-    return data, protocol if protocol.is_file() else None
