@@ -47,15 +47,36 @@ def _check_window(study: Study, participant: str, entry: Entry, session: int, to
             "comes after it"
         )
     window = study.protocol.sessions[session - 1].after_days
-    if window is None or str(session) in entry.waivers or session in begun:
+    days = days_of(session, window, begun[session - 1], entry)
+    if session in begun or days is None or window is None:
         return
-    first, last = (begun[session - 1] + timedelta(days) for days in window)
+    first, last = days
     if not first <= today <= last:
         raise ProtocolError(
             f"session {session} of participant {participant} is due {first} to {last}, "
             f"{window[0]} to {window[1]} days after session {session - 1}; today is {today}; "
             "labcrane waive lets it be run, as a deviation"
         )
+
+
+def days_of(
+    session: int, after_days: tuple[int, int] | None, before: date, entry: Entry | None
+) -> tuple[date, date] | None:
+    """Return the first and last day on which a session may be run; None if every day is allowed.
+
+    Parameters
+    ----------
+    after_days
+        Of the protocol.
+    before
+        When the session before it was.
+    entry
+        The participant's, with the sessions whose window was waived.
+    """
+    if after_days is None or (entry is not None and str(session) in entry.waivers):
+        return None
+    first, last = (before + timedelta(days) for days in after_days)
+    return first, last
 
 
 def enter_sitting(places: Places, participant: str, sitting: Sitting) -> None:

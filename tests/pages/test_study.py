@@ -20,9 +20,12 @@ from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.by import By
 
 from labcrane.cli.app import main
-from labcrane.errors import RecordingError
+from labcrane.errors import ProtocolError, RecordingError
 from labcrane.participants.enrolment import exclude, note
-from labcrane.participants.register import Sitting, changed
+from labcrane.participants.register import Sitting, changed, read
+from labcrane.participants.session_windows import check_visit
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
 from labcrane.web.study.overview import Overview, Reader
 from labcrane.web.study.study_page import page_of, size
@@ -77,6 +80,27 @@ def test_a_session_is_due_in_the_window_that_the_protocol_gives(
         TODAY + timedelta(7), TODAY + timedelta(9)
     )  # fmt: skip
     assert (found["P004"].session, found["P004"].state) == (1, "due")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("waivers", [{}, {"2": "travels"}, {"3": "of another session"}])
+def test_the_page_and_the_session_agree_on_the_days_that_are_allowed(
+    lab: Lab, waivers: dict[str, str]
+) -> None:
+    sat_on(lab, TODAY)
+    with changed(lab.places) as register:
+        register.participants["P001"].waivers = waivers
+    study = load(lab.protocol, discover(study=lab.protocol))
+    for day in (TODAY + timedelta(days) for days in range(14)):
+        [due] = [due for person, due in overview(lab, day).due if person.name == "P001"]
+        try:
+            check_visit(read(lab.places), study, "P001", 2, day)
+        except ProtocolError:
+            assert due.state in {"later", "overdue"}
+        else:
+            assert due.state == "due"
+    with changed(lab.places) as register:
+        register.participants["P001"].waivers = {}
 
 
 @pytest.mark.slow

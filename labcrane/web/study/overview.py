@@ -4,7 +4,7 @@ import shutil
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import date, timedelta
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from labcrane.files.yaml import parse_yaml
 from labcrane.participants.deviations import all_deviations
 from labcrane.participants.folders import Places
 from labcrane.participants.register import Deviation, Entry, Register, read, struck
+from labcrane.participants.session_windows import days_of
 from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.recording.participant_file.writer import DAMAGED
@@ -381,11 +382,11 @@ def _due(
     if coming is None:
         return None
     before = begun.get(coming.number - 1, "")
-    if coming.after_days is None or not before:
+    days = before and days_of(coming.number, coming.after_days, date.fromisoformat(before), entry)
+    if not days:
         return Due(coming.number, coming.name, "due")
-    first, last = (date.fromisoformat(before) + timedelta(days=days) for days in coming.after_days)
-    waived = entry is not None and str(coming.number) in entry.waivers
-    state = "later" if today < first else "due" if today <= last or waived else "overdue"
+    first, last = days
+    state = "later" if today < first else "due" if today <= last else "overdue"
     return Due(coming.number, coming.name, state, first, last)
 
 
