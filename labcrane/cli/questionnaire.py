@@ -56,20 +56,3 @@ class Sheets:
             order, turned = (str(event.data.get(key, "")) for key in ("order", "turned"))
             return Sheet(name, asked, order, turned) if asked else None
         return None if event.name == "questionnaire.end" else sheet
-
-
-def sheet_line(event: Event) -> str | None:
-    """Return the line to print for an event of questionnaires or pages; None for none."""
-    data = event.data
-    match event.name:
-        case "questionnaire.start":
-            return f"questionnaire: {data['title']} (on the participant's page, or q here)"
-        case "questionnaire.refused":
-            return f"not accepted: {data['why']}"
-        case "stop_rule.met":
-            over = f"{data['questionnaire']} {data['score']} is {data['value']}"
-            return f"Stop rule: {over}, above {data['above']}; space to continue, e to end"
-        case "page.denied":
-            return f"refused: {data['why']}"
-        case _:
-            return None

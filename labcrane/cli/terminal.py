@@ -6,12 +6,12 @@ Both run in threads of their own, so that a slow terminal never makes the loop w
 import math
 import re
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from labcrane.cli.questionnaire import Sheet, Sheets, sheet_line
+from labcrane.cli.questionnaire import Sheet, Sheets
 from labcrane.cli.typed import from_terminal, lines, next_key, single_keys
 from labcrane.core.items import AnswerError
 from labcrane.core.records import Event, is_done
@@ -19,6 +19,7 @@ from labcrane.core.roles import Questionnaire
 from labcrane.design.counts import TrialCounts
 from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.standing import SessionStage, Standing
+from labcrane.web.control_room.sentences import sentence
 from labcrane.web.translations import ENGLISH, Words
 
 KEYS: Mapping[str, Order] = {
@@ -140,7 +141,7 @@ class Terminal:
                 self._progress.print(ended, markup=False, highlight=False)
             elif event.name == "session.standing":
                 self._progress.update(self._bar, completed=int(str(event.data["done"])))
-            elif line := _event_line(event):
+            elif line := event_line(event, self._counts.name):
                 self._progress.print(line, markup=False, highlight=False)
 
     def _listen(self) -> None:
@@ -245,38 +246,31 @@ def _short(why: str) -> str:
     return FOLDERS.sub("", why)
 
 
-LACKING: Mapping[str, str] = {
-    "stream.lost": "Stream lost",
-    "feedback.awaited": "Waiting for feedback",
-}
-"""Labels of events that name a missing part."""
+TOLD: Mapping[str, str] = {
+    **dict.fromkeys(
+        (
+            "break.start", "block.start", "pause.start", "pause.end", "plugin.slow", "page.denied",
+            "questionnaire.refused", "feedback.awaited", "input.lost", "input.back", "disk.lost",
+            "disk.back", "stream.lost", "stream.back", "trigger.lost", "trigger.flood",
+        ),
+        "",
+    ),
+    "waiting": "space to start",
+    "judgement.awaited": "c completion, o override; space to continue",
+    "questionnaire.start": "on the participant's page, or q here",
+    "stop_rule.met": "space to continue, e to end",
+}  # fmt: skip
+"""Events whose sentence is printed, and the keys that they ask for."""
 
-SAID: Mapping[str, str] = {
-    "judgement.awaited": "the test has ended: c completion, o override; space to continue",
-}
-"""Texts of events that are always reported alike."""
 
+def event_line(event: Event, called: Callable[[int], str]) -> str | None:
+    """Return the line to print for an event; None for none.
 
-def _event_line(event: Event) -> str | None:
-    data = event.data
-    match event.name:
-        case "instructions.shown":
-            return str(data["text"])
-        case "waiting":
-            return f"{data['what']}: space to start"
-        case "break.start":
-            return f"break of {data['seconds']:g} s"
-        case "block.start":
-            return f"block {data['block']}: {data['block_name']}"
-        case "input.lost" | "disk.lost" | "plugin.slow" | "trigger.lost" | "trigger.flood":
-            return f"{event.name.replace('.', ' ').capitalize()}: {_short(str(data['why']))}"
-        case "stream.lost" | "feedback.awaited":
-            return f"{LACKING[event.name]}: {data['what']}"
-        case "input.back" | "disk.back" | "stream.back":
-            return f"{data.get('what', event.name.partition('.')[0])} is back"
-        case "pause.start" | "pause.end":
-            return f"{event.name.replace('.', ' ')} ({data['by']})"
-        case name if name.startswith("order.") and data["refused"]:
-            return f"{name.removeprefix('order.')}: {data['refused']}"
-        case _:
-            return SAID.get(event.name) or sheet_line(event)
+    ``called`` says what a trial of the plan is called.
+    """
+    if event.name == "instructions.shown":
+        return str(event.data["text"])
+    if event.name not in TOLD and not event.data.get("refused"):
+        return None
+    text, keys = _short(sentence(event, called).text), TOLD.get(event.name)
+    return f"{text} ({keys})" if keys else text

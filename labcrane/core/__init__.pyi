@@ -4,6 +4,7 @@ from . import compiled, kernel
 from .cranes.crane import Crane
 from .cranes.crane_settings import CraneSettings, GrappleSettings, LoadedCraneSettings
 from .cranes.load import LoadedCrane
+from .events import HED_VERSION, name_of
 from .findings import Finding, Verdict
 from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .kernel import Kernel, Places
@@ -52,6 +53,7 @@ from .settings import (
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 
 __all__ = [
+    "HED_VERSION",
     "AnswerError",
     "Answers",
     "AtMost",
@@ -105,6 +107,7 @@ __all__ = [
     "WrongKey",
     "compiled",
     "kernel",
+    "name_of",
     "numeric_answers",
     "outside",
     "read_csv_text",

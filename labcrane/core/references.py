@@ -151,19 +151,6 @@ class Preset:
         return self.named[value]
 
 
-EVENTS = (
-    "block.end", "block.start", "break.end", "break.start", "consent.asked", "consent.given",
-    "feedback.lost", "feedback.ready", "feedback.setting", "fixation.over", "fixation.shown",
-    "instructions.shown", "judgement.awaited", "judgement.over", "pause.end",
-    "pause.start", "practice.end", "questionnaire.answer", "questionnaire.end",
-    "questionnaire.start", "session.end", "session.resumed", "session.start", "signal.bad",
-    "signal.good", "step.end", "step.start", "stream.back", "stream.confirmed",
-    "stream.lost", "trial.end",
-    "trial.start",
-)  # fmt: skip
-"""Events of every session, independent of its task."""
-
-
 @dataclass(frozen=True, slots=True)
 class Mentioned:
     """A mark, and the value at its place.

@@ -11,6 +11,7 @@ from typing import Any
 
 from labcrane.analysis.presented import operators_views
 from labcrane.analysis.scoring.settings import COUNTS, RATINGS, TIME
+from labcrane.core.events import KINDS
 from labcrane.core.references import Reference, mentioned
 from labcrane.core.roles import Controller
 from labcrane.core.settings import Within
@@ -27,7 +28,6 @@ from labcrane.protocol.steps import READING_S, Block
 from labcrane.protocol.streams import SHARES
 from labcrane.protocol.study import Study, trials_of
 from labcrane.recording.pictures import RATE_S
-from labcrane.streams.markers import LEARNT_LATE
 
 _AT = re.compile(r"(.+?):(\d+)(?::(\d+))?: (.*)")
 
@@ -1037,11 +1037,12 @@ def _of_pulses(study: Study) -> Doubts:
     """Question events that are sent as pulses, and are learnt long after they happened."""
     for part, choice in study.others.items():
         for each in mentioned(choice.settings) if part.startswith("triggers.") else ():
-            if each.mark == Reference("event") and each.value in LEARNT_LATE:
+            kind = KINDS.get(str(each.value)) if each.mark == Reference("event") else None
+            if kind is not None and kind.learnt:
                 yield (
                     (*part.split(".", 1), *each.place),
                     f"{part} sends {each.value} as a pulse, and a session learns of it only "
-                    f"{LEARNT_LATE[str(each.value)]}, which may be seconds later; use the labels "
+                    f"{kind.learnt}, which may be seconds later; use the labels "
                     "and the participant file, whose timestamps are right, and remove it here",
                 )
 

@@ -7,7 +7,8 @@ from functools import cached_property
 from os.path import normpath
 from pathlib import Path
 
-from labcrane.core.references import EVENTS, Covers, Mentioned, Once, Reference, mentioned
+from labcrane.core.events import OF_SESSION
+from labcrane.core.references import Covers, Mentioned, Once, Reference, mentioned
 from labcrane.core.roles import Component, Task
 from labcrane.core.settings import Settings
 from labcrane.errors import LabcraneError, nearest
@@ -297,7 +298,7 @@ class ReferenceChecker:
             return None if given is None or not self._all_tasks else given | shown
         if kind == "event":
             given = self._of(self._places("tasks"), kind)
-            return None if given is None else given | set(EVENTS)
+            return None if given is None else given | OF_SESSION
         if kind == "object":
             given = self._of([("dynamics",), *self._places("tasks", "feedback", "views")], kind)
             return None if given is None else given | {*self._machine.names, "foot"}

@@ -2,12 +2,10 @@
 
 from .annotations import Annotation, annotate, read_annotations, withdraw
 from .labels import (
-    HED_VERSION,
     LABELS,
     attempt_of,
     hed_sidecar,
     labelled,
-    name_of,
     void_attempts,
 )
 from .participant_file.about import citation
@@ -17,7 +15,6 @@ from .xdf.header import Channel, StreamHeader
 from .xdf.writer import XdfWriter
 
 __all__ = [
-    "HED_VERSION",
     "LABELS",
     "Annotation",
     "Channel",
@@ -31,7 +28,6 @@ __all__ = [
     "citation",
     "hed_sidecar",
     "labelled",
-    "name_of",
     "open_recording",
     "put_seal",
     "read_annotations",

@@ -1,18 +1,16 @@
 """Labels of events: plain, few and the same in every session, for programs that epoch by name.
 
-docs/markers.md says how they are made; :data:`KNOWN` says what each means, also in HED.
+docs/markers.md says how they are made; :mod:`labcrane.core.events` says what each means.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
+from labcrane.core.events import KINDS, EventKind, name_of
 from labcrane.core.records import UNDONE, Event
 
 LABELS = "labcrane.labels"
 """Name of the stream of labels, live and in exports."""
-
-HED_VERSION = "8.3.0"
-"""Version of the HED schema that the tags of labels are from."""
 
 LONGEST = 64
 """Most characters of a level; a longer text is not a level but a scene or a remark."""
@@ -24,87 +22,6 @@ TRIAL = ("trial", "attempt", *BLOCK, "counted", "group", "reference")
 
 Attempt = tuple[object, object]
 """Number of a trial, and of an attempt at it."""
-
-
-class Meaning(NamedTuple):
-    """Description of a kind of event.
-
-    Attributes
-    ----------
-    words
-        For people.
-    hed
-        In Hierarchical Event Descriptors, in brackets with a label of its own: tags at the same
-        onset are joined, and HED refuses what is said twice.
-    """
-
-    words: str
-    hed: str
-
-
-def _tagged(words: str, name: str, *tags: str) -> Meaning:
-    return Meaning(words, f"({', '.join((*tags, f'Label/{name_of(name)}'))})")
-
-
-def name_of(event: str) -> str:
-    """Return an event's plain name: ``trial.start`` is ``trial_start``."""
-    return event.replace(".", "_")
-
-
-_STRUCTURE, _CONTROL = "Experiment-structure", "Experiment-control"
-_SHOWN = ("Sensory-event", "Visual-presentation")
-_MOVED = ("Agent-action", "(Move, Machine)")
-
-KNOWN: Mapping[str, Meaning] = {
-    name_of(name): _tagged(words, name, *tags)
-    for name, words, *tags in (
-        ("session.start", "the session, or a part of it after an interruption, begins", _STRUCTURE),
-        ("session.end", "the session has come to its end", _STRUCTURE),
-        ("step.start", "a step of the session begins", _STRUCTURE),
-        ("step.end", "a step of the session ends", _STRUCTURE),
-        ("block.start", "a block of trials begins", _STRUCTURE),
-        ("block.end", "a block of trials ends", _STRUCTURE),
-        ("trial.start", "a trial begins", _STRUCTURE),
-        ("trial.end", "a trial ends", _STRUCTURE),
-        ("break.start", "a break begins", _STRUCTURE),
-        ("break.end", "a break ends", _STRUCTURE),
-        ("judgement.awaited", "the experimenter may judge the test that has ended", _CONTROL),
-        ("judgement.over", "the test is judged, and the session goes on", _CONTROL),
-        ("pause.start", "the machine is held at rest", _CONTROL),
-        ("pause.end", "the session goes on", _CONTROL),
-        ("instructions.shown", "instructions are shown", "Sensory-event", "Instructional"),
-        ("fixation.shown", "a point to look at is shown", *_SHOWN, "Cue"),
-        ("fixation.over", "a point to look at is gone", *_SHOWN),
-        ("targets.shown", "the targets are shown", *_SHOWN, "(Target, Circle)"),
-        (
-            "command.onset", "the operator's hand moves", "Agent-action",
-            "Participant-response", "(Move, Hand)",
-        ),
-        ("movement.onset", "the machine moves", *_MOVED),
-        ("movement.offset", "the machine has come to rest", *_MOVED),
-        (
-            "tap.ignored", "the trigger is pressed before anything has moved", "Agent-action",
-            "Participant-response",
-        ),
-        ("target.entered", "the tip is in the target", "Measurement-event", "(Target, Circle)"),
-        ("scene.placed", "the things of a scene are placed", *_SHOWN),
-        ("goal.reached", "a goal of the scenario is reached", "Measurement-event"),
-        ("contact.object", "the machine touches a thing", "Measurement-event"),
-        ("contact.body", "the machine touches a person", "Measurement-event"),
-        ("overload", "a thing or a person is pressed too hard", "Measurement-event", "Press"),
-        ("drop", "what was held has fallen", "Measurement-event", "Drop"),
-        (
-            "deformity.reported", "the operator reports a deformity", "Agent-action",
-            "Participant-response",
-        ),
-        ("deformity.found", "a deformity that is there is reported", "Measurement-event"),
-        ("questionnaire.start", "a questionnaire is asked", "Sensory-event", "Instructional"),
-        ("questionnaire.end", "a questionnaire is submitted", "Agent-action"),
-        ("input.lost", "the operator's controls are lost", _CONTROL),
-        ("input.back", "the operator's controls are back", _CONTROL),
-    )
-}  # fmt: skip
-"""Labels of labcrane's own events; those of a plugin are made in the same way."""
 
 
 class Labels:
@@ -209,15 +126,16 @@ def hed_sidecar(names: Iterable[str]) -> dict[str, Any]:
 
     As BIDS and the HED tools have it. Of an event that is not labcrane's own only its name is said.
     """
-    meanings = {
-        name: KNOWN.get(name, _tagged(name.replace("_", " "), name, "Event"))
+    known = {kind.label: kind for kind in KINDS.values()}
+    kinds = {
+        name: known.get(name) or EventKind(name, None, name.replace("_", " "), ("Event",))
         for name in sorted(set(names))
     }
     return {
         "LongName": "Event",
         "Description": "plain name of the event",
-        "Levels": {name: meaning.words for name, meaning in meanings.items()},
-        "HED": {name: meaning.hed for name, meaning in meanings.items()},
+        "Levels": {name: kind.meaning for name, kind in kinds.items()},
+        "HED": {name: kind.hed for name, kind in kinds.items()},
     }
 
 

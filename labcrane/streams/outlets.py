@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from labcrane.core.events import CODES, HED_VERSION, KINDS, OTHER
 from labcrane.core.records import Frame, Run
 from labcrane.core.signals import Layout
 from labcrane.errors import StreamError
 from labcrane.recording.journal import event_text
-from labcrane.recording.labels import HED_VERSION, KNOWN, LABELS, Labels
-from labcrane.streams.markers import CODES, OTHER
+from labcrane.recording.labels import LABELS, Labels
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -236,8 +236,8 @@ def _describe_codes(info: "pylsl.StreamInfo", codes: Mapping[str, int]) -> None:
 def _describe_labels(info: "pylsl.StreamInfo") -> None:
     table = info.desc().append_child("labels")
     table.append_child_value("hed_version", HED_VERSION)
-    for name, meaning in KNOWN.items():
+    for kind in KINDS.values():
         entry = table.append_child("label")
-        entry.append_child_value("name", name)
-        entry.append_child_value("description", meaning.words)
-        entry.append_child_value("hed", meaning.hed)
+        entry.append_child_value("name", kind.label)
+        entry.append_child_value("description", kind.meaning)
+        entry.append_child_value("hed", kind.hed)

@@ -6,11 +6,11 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 
+from labcrane.core.events import PULSES
 from labcrane.core.records import Echo, Event, Frame, Run, Value
 from labcrane.core.roles import Trigger
 from labcrane.errors import PluginError
 from labcrane.limits import LIMITS
-from labcrane.streams.markers import PULSES
 
 SENT, UNSENT, ECHO = "trigger.sent", "trigger.unsent", "trigger.echo"
 LOST, BACK = "trigger.lost", "trigger.back"

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from labcrane import ProtocolError
-from labcrane.core import read_csv_text
-from labcrane.recording import HED_VERSION
+from labcrane.core import HED_VERSION, read_csv_text
 from labcrane_bids.files import MISSING, label, write_json, write_tsv
 from labcrane_bids.phenotype import age_code
 from labcrane_bids.settings import BidsSettings

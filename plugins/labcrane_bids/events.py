@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane.analysis import PRESENTED, events_of, glass_of, movements_of, presentation_failed
+from labcrane.core import name_of
 from labcrane.recording import (
     SessionRecord,
     attempt_of,
     hed_sidecar,
     labelled,
-    name_of,
     void_attempts,
 )
 from labcrane_bids.files import first_tick

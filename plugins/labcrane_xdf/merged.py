@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from labcrane.analysis import Exporter, Participant, events_of, presentation_failed
+from labcrane.core import name_of
 from labcrane.recording import (
     LABELS,
     Channel,
@@ -17,7 +18,6 @@ from labcrane.recording import (
     XdfWriter,
     hed_sidecar,
     labelled,
-    name_of,
 )
 
 START = "session.start"

@@ -82,12 +82,12 @@ def test_keys_start_pause_note_flag_and_end_a_session(folder: Path) -> None:
     user = TerminalUser([*command, "--participant", "P002", "--local", "--pilot"], folder)
     user.until("space to start")
     user.press(" ")
-    user.until("block 1")
+    user.until("Block 1 began")
     user.press("p")
-    user.until("pause start (examiner)")
+    user.until("Paused by you")
     user.press("nhustet zwei Malx\x7f, ächzt\n")
     user.press(" ")
-    user.until("pause end (examiner)")
+    user.until("No longer paused by you")
     user.press("c1\n")
     user.press("z")  # no order: the keys are shown again
     user.press("e")
@@ -114,7 +114,7 @@ def test_an_interrupt_from_the_keyboard_ends_the_session_in_order(folder: Path) 
     user = TerminalUser([*command, "--participant", "P002", "--local", "--pilot"], folder)
     user.until("space to start")
     user.press(" ")
-    user.until("block 1")
+    user.until("Block 1 began")
     user.process.send_signal(2)
     assert user.leave() == 0
     session = open_recording(folder / "data" / "P002-PILOT" / "P002-PILOT.h5").session(1)
@@ -173,7 +173,7 @@ def test_the_terminal_asks_as_the_page_does_and_takes_the_labels_that_it_shows(
     (tmp_path / "study.yaml").write_text(study, encoding="utf-8")
     command = [sys.executable, "-m", "labcrane", "run", "study.yaml", "--no-page"]
     user = TerminalUser([*command, "--participant", "P002", "--local", "--pilot"], tmp_path)
-    user.until("questionnaire: ")
+    user.until("Questionnaire shown: ")
     user.press("q")
     for ends in ("gering, 100 hoch",) * 3:
         user.until(f"0 bis 100 in Schritten von 5: 0 {ends}")
@@ -182,7 +182,7 @@ def test_the_terminal_asks_as_the_page_does_and_takes_the_labels_that_it_shows(
     user.press("101\r")
     user.until("Möglich ist 0 bis 100 in Schritten von 5: 0 gut, 100 schlecht")
     user.press("10\r5\r5\r")
-    user.until("questionnaire: Zu Ihrer Person")
+    user.until("Questionnaire shown: Zu Ihrer Person")
     user.press("q")
     user.until("eines von weiblich")
     user.press("weiblich\r")
@@ -204,13 +204,13 @@ def test_a_questionnaire_is_filled_in_at_the_terminal(tmp_path: Path) -> None:
     (tmp_path / "study.yaml").write_text(study, encoding="utf-8")
     command = [sys.executable, "-m", "labcrane", "run", "study.yaml", "--no-page"]
     user = TerminalUser([*command, "--participant", "P002", "--local", "--pilot"], tmp_path)
-    user.until("questionnaire: Accuracy")
+    user.until("Questionnaire shown: Accuracy")
     user.press("q")
     user.until("- declines, empty leaves")
     user.press("11\r")
     user.until("not 11.0")
     user.press("7\r")
-    user.until("questionnaire: Situational awareness")
+    user.until("Questionnaire shown: Situational awareness")
     user.press("q-\r")
     assert user.leave() == 0
     table = open_recording(tmp_path / "data/P002-PILOT/P002-PILOT.h5").session(1).questionnaires
@@ -278,16 +278,18 @@ def test_a_refused_order_is_called_as_it_is_given() -> None:
     refused = {"refused": "no trial is running", "text": "", "by": "terminal"}
     with Terminal(console, Console(file=printed), TrialCounts({}, {}), keys=False):
         console.report(Event("order.repeat", 1.0, refused))
-    assert "repeat: no trial is running" in map(str.strip, printed.getvalue().splitlines())
+    assert "Repeat was refused: no trial is running" in map(
+        str.strip, printed.getvalue().splitlines()
+    )
 
 
 def test_a_line_is_short_and_says_nothing_of_what_is_not_known() -> None:
-    from labcrane.cli.terminal import _event_line, _trial_line
+    from labcrane.cli.terminal import _trial_line, event_line
 
     ended = {"trial": 3, "outcome": "timeout", "movement_time": float("nan"), "error": 0.25}
     assert _trial_line(ended, TrialCounts({3: 1}, {})) == "trial 1 of 1: timeout, error 0.25 m"
     place = "dynamics 'slow' of plugin 'p', in step (/home/someone/a/b/slow.py:12), took 9 ms"
     slow = Event("plugin.slow", 0.0, {"why": place})
-    assert _event_line(slow) == (
-        "Plugin slow: dynamics 'slow' of plugin 'p', in step (slow.py:12), took 9 ms"
+    assert event_line(slow, str) == (
+        "Slow call: dynamics 'slow' of plugin 'p', in step (slow.py:12), took 9 ms"
     )

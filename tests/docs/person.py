@@ -26,7 +26,7 @@ TOLD = re.compile(
     r"|pull the trigger of the (?P<pull>LEFT|RIGHT) stick"
     r"|move the (?P<ends>LEFT|RIGHT) stick to all its ends"
     r"|(?P<waits>space to start)"
-    r"|(?P<block>block 1: )"
+    r"|(?P<block>Block 1 began)"
 )
 
 

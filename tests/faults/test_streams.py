@@ -134,9 +134,9 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
         said.order("start")
         said.until("block 1")
         sender.kill()
-        said.until("Stream lost: eeg")
+        said.until("Stream eeg is lost")
         sender.start(first=100_000)
-        said.until("eeg is back")
+        said.until("Stream eeg is back")
         for kill in range(RECORDER_KILLS):
             wait_for(lambda: all_receive(process))
             recorders(process)[kill % 2].kill()
@@ -144,7 +144,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
         wait_for(lambda: all_receive(process) and len(spares(process)) == SPARES)
         for recorder in recorders(process):
             recorder.kill()
-        said.until("Stream lost", times=2)
+        said.until("is lost", times=2)
         said.until(" is back", times=2)
         wait_for(lambda: all_receive(process))
         said.order("note all is well again")

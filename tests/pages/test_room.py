@@ -15,6 +15,7 @@ from governed import TODAY, Lab
 from pages.room import STUDY
 
 from labcrane.cli.terminal import KEYS as TERMINAL_KEYS
+from labcrane.core.events import KINDS
 from labcrane.core.records import Event
 from labcrane.design.plan import plan_session
 from labcrane.participants.enrolment import exclude
@@ -30,7 +31,7 @@ from labcrane.web.control_room.bars import groups
 from labcrane.web.control_room.buttons import answers, buttons
 from labcrane.web.control_room.condition import STATES, ExpectedSession, Lamp, lamp_of, state_of
 from labcrane.web.control_room.earlier import FEWEST, Earlier, read_behind
-from labcrane.web.control_room.sentences import KINDS, SAID, sentence
+from labcrane.web.control_room.sentences import FILTERS, sentence
 from labcrane.web.control_room.shown import ShownShapes
 from labcrane.web.control_room.sliders import sliders
 from labcrane.web.control_room.snapshot import Snapshot, clock
@@ -326,10 +327,10 @@ def test_events_are_sentences_with_the_names_of_trials_and_without_holes() -> No
     def called(number: int) -> str:
         return f"trial {number - 1} of 9"
 
-    for name, (words, kind, _) in SAID.items():
-        data = dict.fromkeys(re.findall(r"{(\w+)}", words), "x")
+    for name, kind in KINDS.items():
+        data = {**dict.fromkeys(re.findall(r"{(\w+)}", kind.sentence), "x"), "trial": 1}
         said = sentence(Event(name, 0.0, data), called)
-        assert said.kind == kind in KINDS
+        assert said.kind in FILTERS
         assert "?" not in said.text
         assert said.text[0].isupper()
     targets = sentence(Event("target.entered", 0.0, {"trial": 4}), called)

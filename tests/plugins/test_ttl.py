@@ -21,10 +21,10 @@ import labcrane_ttl
 from labcrane import DeviceError, PluginError, ProtocolError, Trigger
 from labcrane.core import Echo, Event
 from labcrane.core.clock import Tick
+from labcrane.core.events import CODES, PULSES
 from labcrane.protocol.questions import questions
 from labcrane.registry.registry import discover
 from labcrane.session.session import Visit, run
-from labcrane.streams.markers import CODES, LEARNT_LATE, PULSES
 from labcrane.streams.triggers import Triggers
 from labcrane.testing import PluginContract, TriggerContract, ch8, make_frame, make_run, opened
 from labcrane_ttl.parallel_port import CLAIM, WRITE, ParallelTrigger
@@ -408,7 +408,6 @@ def test_by_default_what_is_shown_or_done_does_not_wait_for_the_frame_of_it(seed
     triggers(frame)
     assert line.sent == [[CODES[done]]]
     assert {name: CODES[name] for name in PULSES} == dict(PULSES)
-    assert set(PULSES) | set(LEARNT_LATE) == set(CODES)
 
 
 def test_codes_that_a_line_cannot_show_in_time_are_told_as_not_sent() -> None:
@@ -440,7 +439,6 @@ def test_events_that_are_learnt_late_are_asked_about_where_they_are_sent(tmp_pat
         "triggers.amp sends movement.onset as a pulse, and a session learns of it only when the "
         "movement is over, or the trial, which may be seconds later"
     )
-    assert not set(LEARNT_LATE) & set(PULSES)
 
 
 @pytest.mark.long

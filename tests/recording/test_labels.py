@@ -1,11 +1,15 @@
 """Labels of events: few, the same in every session, and with what the trial is about."""
 
+import ast
 import random
+import re
 
 import pytest
+from docs.page import ROOT
 
-from labcrane.recording.labels import KNOWN, LONGEST, labelled, plain
-from labcrane.streams.markers import CODES
+from labcrane.core.events import CODES, KINDS, OTHER, PULSES
+from labcrane.recording.labels import LONGEST, labelled, plain
+from labcrane.session.commands import Order
 
 BLOCK = {"block": 2, "block_name": "learning", "task": "aiming", "practice": False}
 TRIAL = {
@@ -86,5 +90,33 @@ def test_whatever_a_condition_says_a_label_has_its_parts_and_no_others(seed: int
     assert all(level.count("=") == 1 for level in levels)
 
 
-def test_every_label_that_is_explained_is_of_an_event_that_there_is() -> None:
-    assert set(KNOWN) <= {name.replace(".", "_") for name in CODES}
+EMITS = {"Event", "_note", "note", "write_event", "_write", "_say"}
+
+
+def emitted() -> dict[str, str]:
+    """Return every event that the sources name where they make one, and where that is."""
+    found = {}
+    sources = [path for top in ("labcrane", "plugins") for path in (ROOT / top).rglob("*.py")]
+    for path in (path for path in sources if "templates" not in path.parts):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.Call) or not node.args:
+                continue
+            called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            name = getattr(node.args[0], "value", None)
+            if called in EMITS and re.fullmatch(r"[a-z_]+\.[a-z_]+", str(name)):
+                found[name] = f"{path.relative_to(ROOT)}:{node.lineno}"
+    return found
+
+
+def test_every_event_that_is_made_has_its_row() -> None:
+    made = emitted()
+    assert len(made) > 40
+    assert {name: where for name, where in made.items() if name not in KINDS} == {}
+    assert {f"order.{order}" for order in Order} <= set(KINDS)
+
+
+def test_a_code_is_of_one_event_and_a_pulse_is_of_what_is_learnt_at_once() -> None:
+    assert len(set(CODES.values())) == len(CODES)
+    assert len({kind.label for kind in KINDS.values()}) == len(KINDS)
+    assert all(OTHER < code < 256 for code in CODES.values())
+    assert set(CODES) - set(PULSES) == {"movement.onset", "movement.offset"}

@@ -17,8 +17,8 @@ from labcrane import RecordingError
 from labcrane.analysis import sampled, to_mne
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.electrodes.mne import volts
+from labcrane.core.events import HED_VERSION, KINDS
 from labcrane.recording import SessionRecord
-from labcrane.recording.labels import HED_VERSION, KNOWN
 from labcrane.testing import ch8
 from labcrane_bids.bids import Bids
 from labcrane_bids.events import event_description
@@ -126,10 +126,10 @@ def test_the_validator_knows_the_tags_of_every_event_also_of_two_at_once(tmp_pat
     about = {"Name": "tags", "BIDSVersion": "1.11.1", "HEDVersion": HED_VERSION}
     (tmp_path / "dataset_description.json").write_text(json.dumps(about), encoding="utf-8")
     (tmp_path / "README").write_text("tags", encoding="utf-8")
-    names = [*KNOWN, "contact_object", "somebody_else"]
+    names = [*(kind.label for kind in KINDS.values()), "contact_object", "somebody_else"]
     table = pd.DataFrame(
         {"onset": 1.0, "duration": 0.0, "trial_type": names, "label": names,
-         "repeat": ["n/a"] * len(KNOWN) + ["2", "n/a"]}
+         "repeat": ["n/a"] * len(KINDS) + ["2", "n/a"]}
     )  # fmt: skip
     columns = {
         key: value for key, value in event_description(table, {}, {}).items() if key in table

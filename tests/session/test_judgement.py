@@ -13,7 +13,7 @@ from simple_crane import CRANE
 from labcrane import ProtocolError, open_recording
 from labcrane.analysis.cohort import find_cohort
 from labcrane.analysis.scoring.operator_tests import OperatorTest, operator_tests
-from labcrane.cli.terminal import _event_line
+from labcrane.cli.terminal import event_line
 from labcrane.core.clock import Tick
 from labcrane.core.records import Event, SessionState
 from labcrane.design.plan import plan_session
@@ -380,8 +380,11 @@ def test_the_operator_sees_a_quiet_screen_while_the_supervisor_judges(tmp_path: 
 
 
 def test_page_and_terminal_say_what_it_waits_for_and_can_judge_also_after_a_resume() -> None:
-    said = _event_line(Event("judgement.awaited", 1.0, {"trial": 3, "attempt": 1}))
-    assert said == "the test has ended: c completion, o override; space to continue"
+    said = event_line(Event("judgement.awaited", 1.0, {"trial": 3, "attempt": 1}), str)
+    assert said == (
+        "Waiting for the experimenter to judge the test "
+        "(c completion, o override; space to continue)"
+    )
     view = SessionView()
     view.take(Event("session.start", 0.0, {}))
     view.take(Event("step.start", 0.0, {"step": 2, "kind": "block"}))

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 
 from labcrane.core.clock import Tick
+from labcrane.core.events import CODES, KINDS, OTHER
 from labcrane.core.records import Event, Frame
 from labcrane.errors import StreamError
 from labcrane.machines.library import load_machine
 from labcrane.recording.journal import event_text
-from labcrane.recording.labels import KNOWN
-from labcrane.streams.markers import CODES, OTHER
 from labcrane.streams.outlets import Outlets, check_clock
 from labcrane.testing import make_frame, make_run
 
@@ -105,7 +104,7 @@ def test_labels_are_explained_in_their_streams_header(received):
     _, heard = received
     table = ET.fromstring(heard["labels"]["xml"]).findall("desc/labels/label")
     told = {entry.findtext("name"): entry.findtext("hed") for entry in table}
-    assert told == {name: meaning.hed for name, meaning in KNOWN.items()}
+    assert told == {kind.label: kind.hed for kind in KINDS.values()}
 
 
 def test_channels_say_what_they_are(received, run):

@@ -16,7 +16,7 @@ from labcrane.web.control_room.bars import groups
 from labcrane.web.control_room.buttons import answers, buttons
 from labcrane.web.control_room.condition import ExpectedSession, lamp_of, shown_badly, state_of
 from labcrane.web.control_room.earlier import Earlier
-from labcrane.web.control_room.sentences import KINDS, held, sentence
+from labcrane.web.control_room.sentences import FILTERS, held, sentence
 from labcrane.web.control_room.sliders import sliders
 from labcrane.web.page import PageContext
 
@@ -117,7 +117,7 @@ class Snapshot:
             "noStreams": self._without_streams(),
             "presented": self._presented(streams),
             "settings": self._settings(),
-            "kinds": list(KINDS),
+            "kinds": list(FILTERS),
             "events": self._events(),
             "cameras": any(context.pictures.cameras.values()),
         }
