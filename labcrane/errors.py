@@ -6,6 +6,7 @@ LabcraneError
 ├── DeviceError      hardware is absent or stopped answering
 ├── StreamError      LSL is set up wrongly, or a stream is missing or broken
 └── RecordingError   a file cannot be written, or has unexpected content
+    └── StorageError     the disk or another program refuses it, whatever its content is
 
 A late tick is not an error: it is data, and is recorded with the frame.
 """
@@ -46,6 +47,19 @@ class StreamError(LabcraneError):
 
 class RecordingError(LabcraneError):
     """A recording cannot be written, found or read."""
+
+
+class StorageError(RecordingError):
+    """The disk, or another program, refuses a file, whatever is in it."""
+
+    @classmethod
+    def of(cls, error: OSError) -> "StorageError":
+        """Return what the computer said of a file, and what to do."""
+        where = error.filename or "a file"
+        return cls(
+            f"{where}: {error.strerror or error}; nothing recorded is affected: make room, close "
+            "the program that holds it, or give another place"
+        )
 
 
 class OutdatedRecordingWarning(UserWarning):

@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from labcrane.errors import ProtocolError, RecordingError
+from labcrane.errors import ProtocolError, RecordingError, StorageError
 from labcrane.files.yaml import parse_yaml
 from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.participant_file.reader import Recording, SessionRecord
@@ -24,6 +24,7 @@ class Status(StrEnum):
     ERASED = "erased"  # only an erasure record is left in the register; cannot be included
     EXCLUDED = "excluded"  # in the register, with a reason; cannot be included
     UNREADABLE = "unreadable"  # no participant file, or a damaged one; cannot be included
+    FAULT = "fault"  # labcrane failed to compute its results; the recording is whole
     HALF_FINISHED = "half-finished"  # a session ended early, or is still to come
     SIMULATED = "simulated"
     PILOT = "pilot"
@@ -110,8 +111,8 @@ class Cohort:
     included: tuple[Participant, ...]
     left_out: tuple[Participant, ...]
 
-    def without(self, name: str, why: str) -> "Cohort":
-        """Return the cohort without a participant whose data could not be read.
+    def without(self, name: str, status: Status, why: str) -> "Cohort":
+        """Return the cohort without a participant whose data could not be used.
 
         Raises
         ------
@@ -119,7 +120,7 @@ class Cohort:
             No other usable participant is left.
         """
         gone = [
-            replace(person, status=Status.UNREADABLE, why=why)
+            replace(person, status=status, why=why)
             for person in self.included
             if person.name == name
         ]
@@ -132,7 +133,8 @@ class Cohort:
     @property
     def unreadable(self) -> tuple[Participant, ...]:
         """Participants left out because their recordings cannot be used."""
-        return tuple(person for person in self.left_out if person.status is Status.UNREADABLE)
+        bad = {Status.UNREADABLE, Status.FAULT}
+        return tuple(person for person in self.left_out if person.status in bad)
 
     def listing(self) -> "pd.DataFrame":
         """Return all participants with status and reason, to be shown with every average."""
@@ -267,6 +269,8 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
         if None not in hollow:
             return Participant(folder.name, path, Status.UNREADABLE, str(hollow[0]))
         status, why, kind = _judge(recording, folder.name)
+    except StorageError:  # nothing is known of the file
+        raise
     except (RecordingError, ProtocolError) as error:  # of the file, of the protocol in it
         return Participant(folder.name, path, Status.UNREADABLE, str(error))
     return Participant(folder.name, path, status, why, kind=kind)

@@ -24,10 +24,9 @@ from labcrane.analysis.quality import OF_AIMING, without_onset
 from labcrane.analysis.sticks import coordination, effort, limit_hits, reversals, stick_use
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.analysis.tables.measure_cache import kept
-from labcrane.errors import LabcraneError
+from labcrane.analysis.unusable import Unusable
 from labcrane.machines.machine import Machine
 from labcrane.recording.participant_file.reader import SessionRecord
-from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -129,12 +128,12 @@ def _all_sessions(participant: Participant, settings: MeasureSettings) -> "pd.Da
     return with_unseen_areas(pd.concat(tables, ignore_index=True))
 
 
-def measure_or_say_why(participant: Participant) -> tuple[str, str, MeasuredParticipant | None]:
+def measure_or_say_why(participant: Participant) -> tuple[str, MeasuredParticipant | Unusable]:
     """Return a participant's name and measures, or why there are none; a worker's function."""
     try:
-        return participant.name, "", measure_ahead(participant)
-    except (LabcraneError, *DAMAGED) as error:  # one recording never stops a cohort
-        return participant.name, f"cannot be measured: {error}", None
+        return participant.name, measure_ahead(participant)
+    except Exception as error:  # noqa: BLE001 - one recording never stops a cohort
+        return participant.name, Unusable.of(error)
 
 
 def measure_ahead(participant: Participant) -> MeasuredParticipant:

@@ -17,7 +17,13 @@ import typer
 
 from labcrane.cli import plugin_groups as extension
 from labcrane.cli.help import Plain, Sections
-from labcrane.errors import LabcraneError, OutdatedRecordingWarning, PluginError, ProtocolError
+from labcrane.errors import (
+    LabcraneError,
+    OutdatedRecordingWarning,
+    PluginError,
+    ProtocolError,
+    StorageError,
+)
 
 MODULES = {
     "run": ("demo", "run", "resume"),
@@ -74,6 +80,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except LabcraneError as error:
         complain(error)
         return 2 if isinstance(error, ProtocolError) else 1
+    except OSError as error:
+        if not error.errno:  # not of the system
+            raise
+        complain(StorageError.of(error))
+        return 1
     finally:
         os.umask(before)
     return 0

@@ -6,7 +6,7 @@ import os
 import threading
 from pathlib import Path
 
-from labcrane.errors import RecordingError
+from labcrane.errors import StorageError
 from labcrane.files.atomic import PRIVATE_FILE, sync_folder
 from labcrane.files.system import BINARY, free_bytes, sync
 
@@ -77,7 +77,7 @@ class AppendFile:
 
         Raises
         ------
-        RecordingError
+        StorageError
             The block is not in the file; all before it are. It may be written again once the cause
             is gone. Also raised, before anything is written, when an earlier sync failed.
         """
@@ -98,7 +98,7 @@ class AppendFile:
             self._ragged = written > 0
             if self._ragged:
                 # Tried again before the next block, and the reader copes with a torn tail.
-                with contextlib.suppress(RecordingError):
+                with contextlib.suppress(StorageError):
                     self._take_back()
             raise self._error("write", failure) from failure
         self.size += written
@@ -154,11 +154,11 @@ class AppendFile:
             except OSError as failure:
                 self._failure = failure
 
-    def _error(self, action: str, failure: OSError) -> RecordingError:
+    def _error(self, action: str, failure: OSError) -> StorageError:
         remedy = REMEDIES.get(failure.errno or 0, "check the disk and the folder")
         if self._fd < 0:
             remedy = "it is closed: continue in a new segment"
-        return RecordingError(
+        return StorageError(
             f"cannot {action} {self.path}: {failure.strerror}; "
             f"the {self.size} bytes before it are in the file; {remedy}"
         )
@@ -170,12 +170,12 @@ def _create(path: Path) -> int:
     try:
         fd = os.open(path, flags, PRIVATE_FILE)
     except FileExistsError as error:
-        raise RecordingError(
+        raise StorageError(
             f"{path} already exists and is not overwritten; continue in a new segment"
         ) from error
     except OSError as error:
         remedy = REMEDIES.get(error.errno or 0, "check that the folder exists and can be written")
-        raise RecordingError(f"cannot create {path}: {error.strerror}; {remedy}") from error
+        raise StorageError(f"cannot create {path}: {error.strerror}; {remedy}") from error
     sync_folder(path.parent)
     return fd
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from labcrane.errors import RecordingError
+from labcrane.errors import StorageError
 
 PRIVATE_FILE = 0o600
 PRIVATE_FOLDER = 0o700
@@ -40,7 +40,7 @@ def replacing(path: Path, mode: int = PRIVATE_FILE) -> Iterator[Path]:
 
     Raises
     ------
-    RecordingError
+    StorageError
         It cannot be written; ``path`` is as it was.
     """
     beside = path.with_name(f".{path.name}{UNFINISHED}")
@@ -54,7 +54,7 @@ def replacing(path: Path, mode: int = PRIVATE_FILE) -> Iterator[Path]:
         beside.chmod(mode)
         beside.replace(path)
     except OSError as error:
-        raise RecordingError(
+        raise StorageError(
             f"cannot write {path}: {error.strerror or error}; it is unchanged: remove the cause, "
             "then try again"
         ) from error

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from labcrane.errors import RecordingError
+from labcrane.errors import StorageError
 from labcrane.files.atomic import PRIVATE_FILE, make_folder
 
 LOOK_S = 0.05
@@ -44,13 +44,13 @@ def held(path: Path, refusal: str, patience_s: float = 0.0) -> Iterator[None]:
 
     Raises
     ------
-    RecordingError
+    StorageError
         Another process still holds it.
     """
     deadline = time.monotonic() + patience_s
     while (fd := _locked(path)) is None:
         if time.monotonic() >= deadline:
-            raise RecordingError(f"{refusal} (process {_owner(path)} holds {path})")
+            raise StorageError(f"{refusal} (process {_owner(path)} holds {path})")
         time.sleep(LOOK_S)
     try:
         os.truncate(fd, 0)
@@ -70,11 +70,11 @@ def _opened(path: Path) -> int:
 
     Raises
     ------
-    RecordingError
+    StorageError
         A link or a folder is in its place, or it cannot be made.
     """
     if path.is_symlink():
-        raise RecordingError(NO_LOCK.format(path, "it is a link"))
+        raise StorageError(NO_LOCK.format(path, "it is a link"))
     deadline = time.monotonic() + (REMOVED_S if sys.platform == "win32" else 0.0)
     while True:
         try:
@@ -84,12 +84,12 @@ def _opened(path: Path) -> int:
                 raise
             time.sleep(LOOK_S / 10.0)
         except OSError as error:
-            raise RecordingError(NO_LOCK.format(path, error.strerror)) from error
+            raise StorageError(NO_LOCK.format(path, error.strerror)) from error
         else:
             if stat.S_ISREG(os.fstat(fd).st_mode):
                 return fd
             os.close(fd)
-            raise RecordingError(NO_LOCK.format(path, "it is not a file"))
+            raise StorageError(NO_LOCK.format(path, "it is not a file"))
 
 
 NO_LOCK = "{} cannot be used as a lock: {}; remove it, then try again"
@@ -159,7 +159,7 @@ def alone_in(folder: Path, *, wait: bool = True) -> Iterator[None]:
 
     Raises
     ------
-    RecordingError
+    StorageError
         Another process holds it, and it is not to be waited for.
     """
     if sys.platform == "win32":
@@ -169,7 +169,7 @@ def alone_in(folder: Path, *, wait: bool = True) -> Iterator[None]:
         fd = os.open(folder, os.O_RDONLY)
         try:
             if not _lock(fd, wait=wait):
-                raise RecordingError(BUSY.format(folder))
+                raise StorageError(BUSY.format(folder))
             yield
         finally:
             os.close(fd)

@@ -14,7 +14,9 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import TypeVar
 
+from labcrane.errors import ProtocolError
 from labcrane.files.atomic import UNFINISHED, make_folder, sync_folder
+from labcrane.files.lock import held
 from labcrane.files.names import file_name_of
 from labcrane.participants.copies import MANIFEST, enter, kept_folder
 from labcrane.participants.folders import Places
@@ -23,6 +25,9 @@ from labcrane.participants.register import Export, changed, read
 from labcrane.recording.data_folder import DataFolder
 
 Someone = TypeVar("Someone")
+
+WRITING = ".labcrane.lock"
+"""Lock in a folder that is being written into."""
 
 
 class Product:
@@ -96,6 +101,7 @@ def product(
     *,
     shared: Sequence[str] = (),
     whole: bool = False,
+    empty: bool = False,
 ) -> Iterator[Product]:
     """Hand out a folder for files with or about participants; they go to ``target`` at the end.
 
@@ -113,8 +119,55 @@ def product(
         Patterns of files that contain no participant's data.
     whole
         Whether everything is computed from all participants' data, so that it is removed whole.
+    empty
+        Whether nothing may be in ``target`` before.
+
+    Raises
+    ------
+    ProtocolError
+        It is not ``empty``.
+    RecordingError
+        Another process is writing into it.
     """
     places, target = Places(data), target.resolve()
+    fresh = not target.exists()
+    make_folder(target)
+    refusal = f"another labcrane is writing into {target}; wait for it, or give another folder"
+    try:
+        with held(target / WRITING, refusal):
+            if empty:
+                check_empty(target)
+            with _written(places, exporter, target, people, today, shared, whole=whole) as made:
+                yield made
+    finally:
+        if fresh and target.is_dir() and not any(target.iterdir()):
+            target.rmdir()
+
+
+def check_empty(folder: Path) -> None:
+    """Refuse a folder in which there is more than what a killed writer left.
+
+    Raises
+    ------
+    ProtocolError
+        There is.
+    """
+    there = folder.iterdir() if folder.exists() else ()
+    if any(each.name != WRITING and not each.name.endswith(UNFINISHED) for each in there):
+        raise ProtocolError(f"{folder} is not empty, and nothing is overwritten; give a new folder")
+
+
+@contextmanager
+def _written(
+    places: Places,
+    exporter: str,
+    target: Path,
+    people: Sequence[str],
+    today: date,
+    shared: Sequence[str],
+    *,
+    whole: bool,
+) -> Iterator[Product]:
     staging = target / f".{file_name_of(exporter)}{UNFINISHED}"
     made = Product(staging, people, shared)
     entry = Export(
@@ -133,7 +186,6 @@ def product(
             register.check_finished()
             enter(places, register, entry.model_copy(deep=True))
     shutil.rmtree(staging, ignore_errors=True)
-    fresh = not target.exists()
     make_folder(staging)
     try:
         yield made
@@ -144,8 +196,6 @@ def product(
         _put(staging, target)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
-        if fresh and not any(target.iterdir()):
-            target.rmdir()
         if tracked and read(places).work is None:
             with changed(places) as register:
                 _settle(places, register.exports, entry)

@@ -47,8 +47,8 @@ from labcrane.analysis.statistics.time_outs import time_outs
 from labcrane.analysis.statistics.time_scales import QUANTITIES, TAKEN
 from labcrane.analysis.tables.annotations import annotations_of
 from labcrane.analysis.tables.definitions import MEASURES
-from labcrane.errors import LabcraneError
-from labcrane.recording.participant_file.writer import DAMAGED, kept_open
+from labcrane.analysis.unusable import Unusable
+from labcrane.recording.participant_file.writer import kept_open
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,12 +56,16 @@ if TYPE_CHECKING:
 SHOWN = ("movement_time", "absolute_error", "path_ratio", "sub_movements", "sparc", "ldlj")
 
 
+FAULTS = "faults.txt"
+"""Tracebacks of faults of labcrane, for a bug report."""
+
+
 def write_report(
     cohort: Cohort,
     folder: Path,
     settings: MeasureSettings = DEFAULTS,
     progress: Callable[[int, int], None] | None = None,
-    leave_out: Callable[[str, str], None] | None = None,
+    leave_out: Callable[[str, Unusable], None] | None = None,
     workers: int = 1,
     scheduler: str | None = None,
     unprobed: Sequence[str] = (),
@@ -92,8 +96,11 @@ def write_report(
     one = partial(_one, settings=settings, folder=folder.resolve())
     found = {}
     for name, why, *tables in work(one, cohort.included, workers, scheduler):
-        if why:
-            cohort = cohort.without(name, why)
+        if why is not None:
+            cohort = cohort.without(name, why.status, why.why)
+            if why.trace:
+                with (folder / FAULTS).open("a", encoding="utf-8") as kept:
+                    kept.write(f"{name}\n{why.trace}\n")
             if leave_out is not None:
                 leave_out(name, why)
         else:
@@ -149,7 +156,7 @@ def _group(own: "pd.DataFrame") -> str:
 
 def _one(
     participant: Participant, settings: MeasureSettings, folder: Path
-) -> "tuple[str, str, *tuple[pd.DataFrame, ...]]":
+) -> "tuple[str, Unusable | None, *tuple[pd.DataFrame, ...]]":
     """Write one participant's page; return name and tables.
 
     These are movements, quality of loop and of clocks, answers, scores, thresholds, drifts of gaze
@@ -167,14 +174,9 @@ def _one(
             gaze = fixations_of(participant), unmeasured_of(participant)
             loop, sync = loop_quality(participant), sync_quality(participant)
             _participant_page(participant, own, loop, sync, folder)
-    except (LabcraneError, *DAMAGED) as error:  # one recording never stops a cohort
-        nothing = pd.DataFrame()
-        return participant.name, _words(error), *([nothing] * 8)
-    return participant.name, "", own, loop, sync, *asked, *gaze
-
-
-def _words(error: Exception) -> str:
-    return str(error) if isinstance(error, LabcraneError) else f"cannot be measured: {error!r}"
+    except Exception as error:  # noqa: BLE001 - one recording never stops a cohort
+        return participant.name, Unusable.of(error), *([pd.DataFrame()] * 8)
+    return participant.name, None, own, loop, sync, *asked, *gaze
 
 
 def _primary(cohort: Cohort) -> list[str]:

@@ -14,10 +14,10 @@ from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.presented import not_presented, presented
 from labcrane.analysis.scoring.indicator import Indicator, Performance, indicate
 from labcrane.analysis.scoring.settings import COUNTS, RATINGS, TIME, IndicatorSettings
+from labcrane.analysis.unusable import Unusable
 from labcrane.core.records import UNDONE, Phase
-from labcrane.errors import LabcraneError, RecordingError
+from labcrane.errors import RecordingError
 from labcrane.recording.participant_file.reader import Recording, SessionRecord
-from labcrane.recording.participant_file.writer import DAMAGED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -123,8 +123,9 @@ def operator_tests(
     for person in people:
         try:
             tests += _tests(person.recording, settings, without)
-        except (LabcraneError, *DAMAGED) as error:  # one recording never stops a cohort
-            without(person.name, f"cannot be read: {error}")
+        except Exception as error:  # noqa: BLE001 - one recording never stops a cohort
+            bad = Unusable.of(error)
+            without(person.name, "\n".join(filter(None, (f"{bad.status}: {bad.why}", bad.trace))))
     if not tests and missing:
         raise RecordingError("; ".join(f"{name} {why}" for name, why in missing))
     if not tests:

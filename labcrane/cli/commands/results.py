@@ -10,11 +10,12 @@ import typer
 from labcrane.cli.commands.approval import today
 from labcrane.cli.options import StudyData, protocol_in, stay_on_this_computer
 from labcrane.cli.output import out
-from labcrane.errors import LabcraneError, PluginError, ProtocolError, RecordingError
+from labcrane.errors import PluginError, ProtocolError, RecordingError, StorageError
 
 if TYPE_CHECKING:
     from labcrane.analysis.cohort import Cohort, Participant
     from labcrane.analysis.movements import Groups
+    from labcrane.analysis.unusable import Unusable
     from labcrane.participants.products import Product
 
 Include = Annotated[
@@ -61,6 +62,8 @@ def export(
     from labcrane.analysis.exporter import Exporter
     from labcrane.analysis.movements import machine_of
     from labcrane.analysis.quality import check_probed
+    from labcrane.analysis.unusable import Unusable
+    from labcrane.participants.products import check_empty
     from labcrane.registry.call_monitor import CallMonitor
     from labcrane.registry.registry import discover
 
@@ -70,8 +73,7 @@ def export(
     plugin = registry.plugin(Exporter, to)
     place = call_monitor.place(f"exporter {to!r}", plugin, "export", offer.build)
     chosen = _settings(offer.settings, settings or [], to)
-    if folder.exists() and any(folder.iterdir()):
-        raise ProtocolError(f"{folder} is not empty, and nothing is overwritten; give a new folder")
+    check_empty(folder)  # before anything is measured
     cohort = cohort_of(data.resolve() if scheduler else data, include)
     unknown = check_probed(cohort.included, accept=accept_unprobed)
     _, first = next(cohort.included[0].sessions())
@@ -80,16 +82,20 @@ def export(
     def attempt(cohort: "Cohort") -> None:
         people = _Read(_measured(cohort, workers, scheduler))
         with (
-            _product(data, to, folder, cohort, shared=exporter.shared) as made,
+            _product(data, to, folder, cohort, shared=exporter.shared, empty=True) as made,
             progress_bar(f"export to {to}", len(cohort.included)) as advance,
         ):
             handed = made.handing_out((person.name, person) for person in people.counted(advance))
             try:
                 call_monitor.call(place, exporter.export, handed, made.folder)
-            except LabcraneError as error:
+            except RecordingError as error:
                 if people.now is None:  # no participant's data were being read
                     raise
-                raise _Unusable(people.now, str(error)) from error
+                raise _UnusableError(people.now, Unusable.of(error)) from error
+            except PluginError as error:
+                if isinstance(error.__cause__, OSError) and error.__cause__.errno:
+                    raise StorageError.of(error.__cause__) from error
+                raise
             _write_manifest(made.folder, to, chosen.model_dump(mode="json"), cohort, unknown)
 
     cohort = _without_bad(attempt, cohort)
@@ -97,10 +103,10 @@ def export(
     _tell_left_out(cohort)
 
 
-class _Unusable(Exception):  # noqa: N818 - no error: the rest is done without
-    """One participant's data stopped an output for all."""
+class _UnusableError(Exception):
+    """One participant's data stopped an output for all; the rest is done without."""
 
-    def __init__(self, name: str, why: str) -> None:
+    def __init__(self, name: str, why: "Unusable") -> None:
         super().__init__(name, why)
         self.name, self.why = name, why
 
@@ -125,15 +131,17 @@ def _without_bad(attempt: "Callable[[Cohort], None]", cohort: "Cohort") -> "Coho
     while True:
         try:
             attempt(cohort)
-        except _Unusable as bad:
+        except _UnusableError as bad:
             cohort = _leave_out(cohort, bad.name, bad.why)
         else:
             return cohort
 
 
-def _leave_out(cohort: "Cohort", name: str, why: str) -> "Cohort":
-    out.print(f"left out: {name}, cannot be used: {why}", markup=False)
-    return cohort.without(name, why)
+def _leave_out(cohort: "Cohort", name: str, why: "Unusable") -> "Cohort":
+    out.print(f"left out: {name}, cannot be used: {why.why}", markup=False)
+    if why.trace:
+        typer.echo(why.trace, err=True)
+    return cohort.without(name, why.status, why.why)
 
 
 def _tell_left_out(cohort: "Cohort") -> None:
@@ -155,12 +163,13 @@ def _measured(
     if workers == 1 and scheduler is None:
         return cohort.included
     from labcrane.analysis.measures import measure_or_say_why
+    from labcrane.analysis.unusable import Unusable
 
     with progress_bar("measure", len(cohort.included)) as advance:
         done = {}
-        for name, why, person in work(measure_or_say_why, cohort.included, workers, scheduler):
-            if person is None:
-                raise _Unusable(name, why)
+        for name, person in work(measure_or_say_why, cohort.included, workers, scheduler):
+            if isinstance(person, Unusable):
+                raise _UnusableError(name, person)
             done[name] = person
             advance()
     return [done[person.name] for person in cohort.included]
@@ -185,7 +194,7 @@ def report(
     cohort = cohort_of(data.resolve() if scheduler else data, include)
     unknown = check_probed(cohort.included, accept=accept_unprobed)
 
-    def leave_out(name: str, why: str) -> None:
+    def leave_out(name: str, why: "Unusable") -> None:
         nonlocal cohort
         cohort = _leave_out(cohort, name, why)
 
@@ -385,6 +394,7 @@ def _product(
     *,
     shared: Sequence[str] = (),
     whole: bool = False,
+    empty: bool = False,
 ) -> "AbstractContextManager[Product]":
     """Return an output folder that the register knows; see :mod:`~.participants.products`.
 
@@ -395,7 +405,7 @@ def _product(
 
     people = [*cohort.included, *cohort.left_out]
     names = [person.name for person in people if person.status is not Status.ERASED]
-    return product(data, writer, folder, names, today(), shared=shared, whole=whole)
+    return product(data, writer, folder, names, today(), shared=shared, whole=whole, empty=empty)
 
 
 @contextmanager

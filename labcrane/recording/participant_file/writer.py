@@ -5,6 +5,8 @@ to the old one. The new file is flushed to the disk, read again, and only then t
 name.
 """
 
+import errno
+import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from labcrane.errors import RecordingError
+from labcrane.errors import RecordingError, StorageError
 from labcrane.files.atomic import replacing
 from labcrane.files.lock import alone_in
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
@@ -48,6 +50,9 @@ DAMAGED = (
     OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError,
 )  # fmt: skip
 """Exceptions that reading a damaged file may raise."""
+
+HELD = frozenset({errno.EACCES, errno.EAGAIN, errno.EBUSY, errno.EMFILE, errno.ENFILE, errno.EPERM})
+"""Numbers of errors with which a system refuses a file whatever is in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,6 +254,7 @@ def opened(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
     try:
         file = h5py.File(path, "r") if cached else h5py.File(path, "r", rdcc_nbytes=0)
     except (OSError, RuntimeError, ValueError) as error:  # ValueError: no name of a file
+        _raise_if_held(path, error)
         raise RecordingError(f"cannot read {path}: {error}") from error
     with file:
         check_texts(file, path)
@@ -286,9 +292,19 @@ def reading(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
             yield file
     # h5py, numpy, pandas and json raise what they like of damaged files.
     except (*DAMAGED, MemoryError) as error:
+        _raise_if_held(path, error)
         raise RecordingError(
             f"{path} is damaged: {error!r}; move it elsewhere, then run labcrane recover "
             f"{path.parent} to rebuild it from the journals, if they exist"
+        ) from error
+
+
+def _raise_if_held(path: Path, error: Exception) -> None:
+    """Raise that another program or the system refuses a file, where nothing says it is damaged."""
+    if isinstance(error, OSError) and error.errno in HELD:
+        raise StorageError(
+            f"{path} cannot be opened now: {os.strerror(error.errno)}; close the program that "
+            "holds it, such as a viewer of HDF5 files, or see who may read it"
         ) from error
 
 

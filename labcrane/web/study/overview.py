@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Participant, Status, everyone, unfinished
 from labcrane.analysis.quality import loop_quality, sync_quality
+from labcrane.analysis.unusable import Unusable
 from labcrane.approval.lock import lock_path, read_lock
 from labcrane.core.findings import Verdict
-from labcrane.errors import LabcraneError, ProtocolError
+from labcrane.errors import ProtocolError
 from labcrane.files.study_folder import data_of, protocol_of
 from labcrane.files.yaml import parse_yaml
 from labcrane.participants.deviations import all_deviations
@@ -21,7 +22,6 @@ from labcrane.participants.register import Deviation, Entry, Register, read, str
 from labcrane.participants.session_windows import days_of
 from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.participant_file.reader import SessionRecord
-from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.streams.sync.report.limits import LATE
 
 if TYPE_CHECKING:
@@ -335,8 +335,8 @@ def _sessions(own: Participant) -> tuple[Sat, ...]:
     try:
         loops, syncs = loop_quality(own), sync_quality(own)
         return tuple(_quality(number, record, loops, syncs) for number, record in own.sessions())
-    except (LabcraneError, *DAMAGED) as error:
-        return (Sat(0, "", "bad", (f"cannot be read: {error}",)),)
+    except Exception as error:  # noqa: BLE001 - one recording never stops the page
+        return (Sat(0, "", "bad", (Unusable.of(error).why,)),)
 
 
 def _quality(
