@@ -20,7 +20,7 @@ from labcrane.cli.options import (
 from labcrane.cli.output import out
 from labcrane.cli.sync import STYLES
 from labcrane.cli.typed import from_terminal
-from labcrane.errors import LabcraneError, ProtocolError, RecordingError, nearest
+from labcrane.errors import ProtocolError, RecordingError, nearest
 
 if TYPE_CHECKING:
     from labcrane.doctor.report import Check, Diagnosis
@@ -194,14 +194,13 @@ def report_problem(
 ) -> None:
     """Write an archive for a bug report, with nothing of people in it.
 
-    It is shown before it is written. It has the doctor's findings, versions, and the events and
-    timing of the last session: no answers, notes, pseudonyms, users, computers or folders.
+    It is shown before it is written. It has versions, the doctor's verdicts, and the events and
+    timing of the last session: no text that a person wrote, no names, and no messages of errors.
     """
     from labcrane.cli.problem_report import (
         check_new,
         compose,
         find_session,
-        pattern_of,
         write,
     )
     from labcrane.files.names import absent
@@ -217,9 +216,7 @@ def report_problem(
         raise RecordingError(f"there is no folder {folder}; give the study's data folder")
     found_session = find_session(folder, session)
     found, trouble = _examined(protocol, folder)
-    study_folder = protocol.parent if protocol else Path()
-    patterns = pattern_of(protocol) if protocol else ()
-    files = compose(found, trouble, found_session, (folder, study_folder), patterns)
+    files = compose(found, trouble, found_session)
     if show is not None:
         if show not in files:
             raise ProtocolError(f"--show {show}: {nearest(show, files, 'the archive has')}")
@@ -235,14 +232,16 @@ def report_problem(
     out.print(f"written: {to}", markup=False)
 
 
-def _examined(protocol: Path | None, folder: Path) -> tuple["Diagnosis | None", Sequence[str]]:
-    """Return what the doctor finds, and why a study could not be read: both belong to a report."""
+def _examined(
+    protocol: Path | None, folder: Path
+) -> tuple["Diagnosis | None", Sequence[Exception]]:
+    """Return what the doctor finds, and what kept it or the study from being read."""
     from labcrane.doctor.checks import examine, left_out
     from labcrane.doctor.report import diagnosis
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
 
-    study, trouble = None, list[str]()
+    study, trouble = None, list[Exception]()
     try:
         registry = discover()
         if protocol is not None:
@@ -250,11 +249,10 @@ def _examined(protocol: Path | None, folder: Path) -> tuple["Diagnosis | None", 
                 with_own = discover(study=protocol)
                 study, registry = load(protocol, with_own), with_own
             except Exception as error:  # noqa: BLE001 - any fault may be what the report is about
-                known = isinstance(error, LabcraneError)
-                trouble.append(str(error) if known else f"{type(error).__name__}: {error}")
+                trouble.append(error)
         return diagnosis(examine(folder, registry, study), left_out(registry, study)), trouble
     except Exception as error:  # noqa: BLE001 - as above
-        return None, [*trouble, f"labcrane doctor failed: {type(error).__name__}: {error}"]
+        return None, [*trouble, error]
 
 
 def _print_files(files: Mapping[str, str]) -> None:
