@@ -1,13 +1,16 @@
 """One MAT file per participant, and the function that loads them all."""
 
 import json
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.io import savemat
+from scipy.io.matlab import MatWriteError
 
 from labcrane import RecordingError
 from labcrane.analysis import (
@@ -21,7 +24,6 @@ from labcrane.analysis import (
     scores_of,
 )
 from labcrane.recording import SessionRecord, Stream
-from labcrane_matlab.mat5 import Element, cells, numbers, struct, text, texts, write_mat
 from labcrane_matlab.settings import MatlabSettings
 
 if TYPE_CHECKING:
@@ -34,8 +36,19 @@ LONGEST = 63
 LARGEST = 2**31 - 1
 """Bytes in a variable of a MAT file of version 5."""
 
-ROWS = 1 << 16
-"""Samples of one column that are in memory at a time."""
+Value = Any
+"""What scipy writes: a text, a column, a mapping of them, or :class:`Later`."""
+
+
+class Later:
+    """A column that is read when scipy writes it: one of a stream is in memory at a time."""
+
+    def __init__(self, read: Callable[[], Value]) -> None:
+        self._read = read
+
+    def __array__(self, dtype: object = None, copy: object = None) -> Any:
+        """Read the column; scipy asks for no type."""
+        return _column(self._read())
 
 
 class Matlab(Exporter):
@@ -53,106 +66,102 @@ class Matlab(Exporter):
 
     def export(self, participants: Iterable[Participant], folder: Path) -> None:
         for participant in participants:
-            content = self._content(participant)
-            _refuse_large(participant.name, content)
-            write_mat(folder / f"{participant.name}.mat", "labcrane", content)
+            write_mat(folder / f"{participant.name}.mat", self._content(participant))
         copyfile(Path(__file__).with_name(READER), folder / READER)
 
-    def _content(self, participant: Participant) -> Element:
+    def _content(self, participant: Participant) -> Value:
         measures = beside_trials(measures_of(participant), participant)
         book = codebook_of(participant, measures)
         trials = book[book["table"] == "trials"]
-        return struct(
-            {
-                "study": text(str(participant.context.get("study", ""))),
-                "participant": text(participant.name),
-                "status": text(str(participant.status)),
-                "why": text(participant.why),
-                "trials": columns(measures, self._trials),
-                "questionnaires": columns(answers_of(participant)),
-                "scores": columns(scores_of(participant)),
-                "units": _units(
-                    dict(zip(trials["column"], trials["unit"], strict=True)), self._trials
-                ),
-                "sessions": cells(
-                    [self._session(number, record) for number, record in participant.sessions()]
-                ),
-            }
-        )
+        return {
+            "study": str(participant.context.get("study", "")),
+            "participant": participant.name,
+            "status": str(participant.status),
+            "why": participant.why,
+            "trials": columns(measures, self._trials),
+            "questionnaires": columns(answers_of(participant)),
+            "scores": columns(scores_of(participant)),
+            "units": _units(dict(zip(trials["column"], trials["unit"], strict=True)), self._trials),
+            "sessions": _cells(
+                [self._session(number, record) for number, record in participant.sessions()]
+            ),
+        }
 
-    def _session(self, number: int, session: SessionRecord) -> Element:
+    def _session(self, number: int, session: SessionRecord) -> Value:
         events = events_of(session).copy()
         events["data"] = [
             "{}" if name == "session.start" else json.dumps(data, ensure_ascii=False)
             for name, data in zip(events["name"], events["data"], strict=True)
         ]
         content = {
-            "number": _number(number),
-            "rate_hz": _number(float(session.attrs["rate_hz"])),
-            "started": text(str(session.attrs.get("started", ""))),
+            "number": float(number),
+            "rate_hz": float(session.attrs["rate_hz"]),
+            "started": str(session.attrs.get("started", "")),
             "events": columns(events),
             "annotations": columns(session.annotations),
         }
         if self._settings.streams:
             names = fields(list(session.streams))
             streams = zip(names, session.streams.values(), strict=True)
-            content["streams"] = struct({field: _stream(stream) for field, stream in streams})
-        return struct(content)
+            content["streams"] = {field: _stream(stream) for field, stream in streams}
+        return content
 
 
-def _stream(stream: Stream) -> Element:
-    """Return a stream, whose columns are read while they are written."""
-    names, count = list(stream.units), len(stream)
-    return struct(
-        {
-            "name": text(stream.name),
-            "time": _read(count, lambda cut: stream.column("time", cut.start, cut.stop)),
-            "data": struct(
-                {
-                    field: _read(count, partial(_channel, stream, name))
-                    for field, name in zip(fields(names), names, strict=True)
-                }
-            ),
-            "units": _units(stream.units),
-        }
-    )
+def write_mat(path: Path, content: Value) -> None:
+    """Write a file of the one variable ``labcrane``.
+
+    Raises
+    ------
+    RecordingError
+        MATLAB does not read as much; the file is removed.
+    """
+    with suppress(MatWriteError):  # above 4 GB scipy itself stops
+        savemat(path, {"labcrane": content}, long_field_names=True, oned_as="column")
+    if (size := path.stat().st_size) > LARGEST:
+        path.unlink()
+        raise RecordingError(
+            f"{path.stem} has {size / 1e9:.1f} GB of numbers; a MAT file of version 5 holds 2 "
+            "GB: read the participant file itself with h5read, or export with --set streams=false"
+        )
 
 
-def _channel(stream: Stream, name: str, cut: slice) -> Any:
-    return stream.values([name], cut.start, cut.stop)[name]
+def _stream(stream: Stream) -> Value:
+    names = list(stream.units)
+    return {
+        "name": stream.name,
+        "time": Later(partial(stream.column, "time")),
+        "data": {
+            field: Later(partial(_channel, stream, name))
+            for field, name in zip(fields(names), names, strict=True)
+        },
+        "units": _units(stream.units),
+    }
 
 
-def _read(count: int, read: Callable[[slice], Any]) -> Element:
-    """Return a column of a stream, a piece of which ``read`` reads."""
-
-    def pieces() -> Iterator[Any]:
-        for at in range(0, count, ROWS):
-            yield read(slice(at, at + ROWS))
-
-    if read(slice(0, 1)).dtype.kind in "fiub":
-        return numbers(count, pieces)
-    return texts(count, lambda: (_cell(value) for piece in pieces() for value in piece))
+def _channel(stream: Stream, name: str) -> Value:
+    return stream.values([name])[name]
 
 
-def columns(table: "pd.DataFrame", fields: "Fields | None" = None) -> Element:
+def columns(table: "pd.DataFrame", fields: "Fields | None" = None) -> Value:
     """Return a table as a struct of columns: numbers as doubles, everything else as cells."""
     of = (fields or Fields()).of
-    return struct({of(str(name)): _column(table[name]) for name in table})
+    return {of(str(name)): _column(table[name]) for name in table}
 
 
-def _column(values: "pd.Series[Any]") -> Element:
+def _column(values: Any) -> Value:
     if values.dtype.kind in "fiub":
-        doubles = values.to_numpy(np.float64)
-        return numbers(len(doubles), lambda: [doubles])
-    return texts(len(values), lambda: map(_cell, values))
+        return np.asarray(values, np.float64)
+    return _cells([_cell(value) for value in values])
+
+
+def _cells(values: Sequence[Value]) -> Value:
+    cells = np.empty(len(values), object)
+    cells[:] = values
+    return cells
 
 
 def _cell(value: Any) -> str:
     return "" if value is None or value != value else str(value)  # noqa: PLR0124 - NaN
-
-
-def _number(value: float) -> Element:
-    return numbers(1, lambda: [np.array([value])])
 
 
 class Fields:
@@ -190,14 +199,6 @@ def _field(name: str, taken: Collection[str]) -> str:
     return unique
 
 
-def _units(units: Mapping[str, str], fields: Fields | None = None) -> Element:
+def _units(units: Mapping[str, str], fields: Fields | None = None) -> Value:
     of = (fields or Fields()).of
-    return struct({of(name): text(unit) for name, unit in units.items()})
-
-
-def _refuse_large(name: str, content: Element) -> None:
-    if content.size > LARGEST:
-        raise RecordingError(
-            f"{name} has {content.size / 1e9:.1f} GB of numbers; a MAT file of version 5 holds 2 "
-            "GB: read the participant file itself with h5read, or export with --set streams=false"
-        )
+    return {of(name): unit for name, unit in units.items()}

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.io import loadmat, savemat
+from scipy.io import loadmat
 
 from labcrane import RecordingError
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.measures import measures_of
-from labcrane_matlab import mat5, matlab
+from labcrane_matlab import matlab
 from labcrane_matlab.matlab import Matlab, fields
 from labcrane_matlab.settings import MatlabSettings
 from results.consumers import needs_octave, octave, table, under
@@ -57,41 +57,21 @@ def test_files_are_version_5(folder: Path) -> None:
     assert content["sessions"]["events"]["name"][0] == "session.start"
 
 
-def as_scipy(value: object) -> mat5.Element:
-    if isinstance(value, dict):
-        return mat5.struct({name: as_scipy(each) for name, each in value.items()})
-    if isinstance(value, str):
-        return mat5.text(value)
-    assert isinstance(value, np.ndarray)
-    if value.dtype == object:
-        return mat5.cells([as_scipy(each) for each in value])
-    return mat5.numbers(len(value), lambda: [value[:3], value[3:]])
-
-
-def same(ours: np.ndarray | None, theirs: np.ndarray | None) -> None:
-    if ours is None or theirs is None:  # a struct without fields
-        assert ours is theirs
-        return
-    assert (ours.dtype, ours.shape) == (theirs.dtype, theirs.shape)
-    if ours.dtype.names:
-        for name in ours.dtype.names:
-            same(ours[name], theirs[name])
-    elif ours.dtype == object:
-        for one, other in zip(ours.ravel(), theirs.ravel(), strict=True):
-            same(one, other)
-    else:
-        np.testing.assert_array_equal(ours, theirs)
-
-
-def test_a_file_written_by_pieces_is_what_scipy_reads_and_writes(tmp_path: Path) -> None:
-    rng = np.random.default_rng()
-    cells = np.array(["a", "", "längere Wörter, 漢字"], object)
-    inside = {"x" * 63: rng.standard_normal(100_000), "none": np.empty(0), "of": cells}
-    content = {"text": "Übung", "empty": "", "struct": inside, "no_fields": {}, "one": np.ones(1)}
-    mat5.write_mat(tmp_path / "ours.mat", "labcrane", as_scipy(content))
-    savemat(tmp_path / "theirs.mat", {"labcrane": content}, long_field_names=True, oned_as="column")
-    ours, theirs = (loadmat(tmp_path / f"{name}.mat")["labcrane"] for name in ("ours", "theirs"))
-    same(ours, theirs)
+def test_texts_and_columns_that_are_read_later_are_in_the_file(tmp_path: Path) -> None:
+    drawn = np.random.default_rng().standard_normal(100_000)
+    words = np.array(["a", "", "längere Wörter, 漢字"])
+    later = {"x" * 63: drawn, "none": np.empty(0), "of": words, "yes": drawn > 0}
+    content = {"text": "Übung", "empty": "", "no_fields": {}, "one": 1.0}
+    inside = {name: matlab.Later(lambda each=each: each) for name, each in later.items()}
+    matlab.write_mat(tmp_path / "P001.mat", content | {"struct": inside})
+    read = loadmat(tmp_path / "P001.mat")["labcrane"][0, 0]
+    struct = read["struct"][0, 0]
+    np.testing.assert_array_equal(struct["x" * 63], drawn[:, np.newaxis])
+    np.testing.assert_array_equal(struct["yes"], (drawn[:, np.newaxis] > 0).astype(float))
+    assert struct["yes"].dtype == float
+    assert struct["none"].size == 0
+    assert ["".join(each) for each in struct["of"][:, 0]] == words.tolist()
+    assert (read["text"][0], read["empty"].size, read["one"][0, 0]) == ("Übung", 0, 1.0)
 
 
 def test_fields_are_names_that_matlab_takes() -> None:
@@ -108,3 +88,4 @@ def test_more_than_a_mat_file_holds_is_refused(
     monkeypatch.setattr(matlab, "LARGEST", 1000)
     with pytest.raises(RecordingError, match=r"P001 has .* GB of numbers; a MAT file of version 5"):
         Matlab(MatlabSettings()).export(cohort.included, tmp_path)
+    assert under(tmp_path) == []
