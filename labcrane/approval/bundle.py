@@ -30,7 +30,6 @@ from labcrane.approval.environment import (
 )
 from labcrane.approval.lock import lock_path, read_lock
 from labcrane.approval.materials import files_of_settings, study_files
-from labcrane.approval.repacked import repacked
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import UNFINISHED, copy, sha256, write_text
 from labcrane.files.yaml import YamlFile
@@ -171,15 +170,27 @@ def _wanted(package: Distribution) -> str:
 
 
 def _checked_wheels(packages: list[Distribution], folder: Path) -> dict[str, Path]:
-    """Return the wheel of each package by its name, with the installed files."""
+    """Return the wheel of each package by its name, with the installed files.
+
+    Raises
+    ------
+    ProtocolError
+        A wheel is missing, or has other files than those that are installed and approved: Debian's
+        Python brings a setuptools and a pip of its own, which no index has.
+    """
+    others = list[str]()
     wheels = {one_name(path.name.partition("-")[0]): path for path in folder.glob("*.whl")}
     for package in packages:
         name = one_name(package.name)
         if name not in wheels:
             raise ProtocolError(f"pip made no wheel of {name} {package.version}; reinstall it")
         if not is_working_copy(package) and fingerprint(package) != _of_wheel(wheels[name]):
-            wheels[name].unlink()  # the installed files were approved, not those of an index
-            wheels[name] = repacked(package, folder)
+            others.append(f"{name}=={package.version}")
+    if others:
+        raise ProtocolError(
+            f"the wheels of {', '.join(others)} have other files than those installed; install "
+            f"them from the wheels: pip install --force-reinstall --no-deps {' '.join(others)}"
+        )
     return wheels
 
 

@@ -7,7 +7,9 @@ import shutil
 import sys
 import sysconfig
 import venv
+import zipfile
 from hashlib import sha256
+from importlib.metadata import distribution
 from pathlib import Path
 
 import h5py
@@ -17,7 +19,7 @@ from fresh_environment import run
 from needs import needs
 
 from labcrane.approval import bundle_install
-from labcrane.approval.bundle import bundle
+from labcrane.approval.bundle import _checked_wheels, bundle
 from labcrane.approval.materials import materials
 from labcrane.errors import ProtocolError
 from labcrane.protocol.study import load
@@ -222,3 +224,11 @@ def test_a_link_in_a_bundle_is_refused(tmp_path: Path) -> None:
     (folder / "study" / "more.py").symlink_to("plugins/own.py")
     [why] = bundle_install._wrong(folder, tmp_path / "there")
     assert why == "study/more.py is a link, which bundles do not contain; copy the bundle again"
+
+
+def test_a_package_with_other_files_than_the_wheel_of_an_index_is_refused(tmp_path: Path) -> None:
+    here = distribution("pluggy")
+    with zipfile.ZipFile(tmp_path / f"pluggy-{here.version}-py3-none-any.whl", "w") as wheel:
+        wheel.writestr(f"pluggy-{here.version}.dist-info/RECORD", "pluggy/__init__.py,sha256=a,1\n")
+    with pytest.raises(ProtocolError, match=rf"--no-deps pluggy=={here.version}$"):
+        _checked_wheels([here], tmp_path)
