@@ -203,7 +203,7 @@ def _needed() -> Mapping[str, str]:
 def _ours() -> Mapping[str, str]:
     """Return the plugins that come with labcrane, and its own package, by their modules."""
     points = entry_points_of(PROJECT)
-    of = {point.module: point.name for point in points if point.dist.name == PROJECT}
+    of = {one.module: one.name for one in points if one.dist and one.dist.name == PROJECT}
     return {PROJECT: PROJECT, **of}
 
 

@@ -1,19 +1,17 @@
-"""Entry points of whatever is installed, read once and without ``importlib.metadata``.
+"""Entry points of whatever is installed in folders, read once and without ``importlib.metadata``.
 
 Every command asks for them, and what the standard library needs to read them (the parser of mail)
-takes a fifth of the time in which the help is printed. Where something else than folders offers
-packages (a zip on the path, a finder of its own), the standard library is asked.
+takes a fifth of the time in which the help is printed.
 """
 
 import os
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from functools import lru_cache
 from importlib import import_module
-from importlib.machinery import PathFinder
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from importlib.metadata import Distribution
@@ -25,25 +23,7 @@ LISTED = "entry_points.txt"
 """File of a distribution's entry points, in sections named by group."""
 
 
-class EntryPoint(Protocol):
-    """A name under which a distribution offers a module or an object, as the library's own are."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def value(self) -> str: ...
-
-    @property
-    def module(self) -> str: ...
-
-    @property
-    def dist(self) -> Any: ...
-
-    def load(self) -> Any: ...
-
-
-class ListedPoint(NamedTuple):
+class EntryPoint(NamedTuple):
     """An entry point as a line of a distribution's file says it."""
 
     name: str
@@ -57,8 +37,8 @@ class ListedPoint(NamedTuple):
         return self.value.partition(":")[0].strip()
 
     @property
-    def dist(self) -> "Distribution":
-        """The distribution that offers it."""
+    def dist(self) -> "Distribution | None":
+        """The distribution that offers it; points of the standard library may have none."""
         from importlib.metadata import Distribution  # noqa: PLC0415 - what this module spares
 
         return Distribution.at(self.folder)
@@ -74,43 +54,16 @@ class ListedPoint(NamedTuple):
 
 def entry_points_of(group: str) -> tuple[EntryPoint, ...]:
     """Return the entry points of a group, of all that can be imported now from ``sys.path``."""
-    return tuple(each for where, each in _all(tuple(sys.path)) if where == group)
+    return tuple(each for each in _all(tuple(sys.path)) if each.group == group)
 
 
 @lru_cache(maxsize=1)
-def _all(path: tuple[str, ...]) -> tuple[tuple[str, EntryPoint], ...]:
-    others = [each for each in sys.meta_path if each is not PathFinder]
-    packed = [place for place in path if Path(place).is_file()]
-    if packed or any(hasattr(each, "find_distributions") for each in others):
-        from importlib.metadata import distributions  # noqa: PLC0415 - what this module spares
-
-        return _first_of_each(
-            (_name(each), [(point.group, point) for point in each.entry_points])
-            for each in distributions()
-        )
-    return _first_of_each(
-        (folder.name.partition("-")[0], [(point.group, point) for point in _points(folder)])
-        for place in path
-        for folder in _information(place)
-    )
-
-
-def _name(found: "Distribution") -> str:
-    """Return a distribution's name; empty for remains of an installer."""
-    try:
-        return found.metadata["Name"] or ""
-    except FileNotFoundError:  # as later libraries say it
-        return ""
-
-
-def _first_of_each(
-    found: Iterable[tuple[str, list[tuple[str, EntryPoint]]]],
-) -> tuple[tuple[str, EntryPoint], ...]:
-    """Return the entry points of the first distribution of each name: only that can be imported."""
-    first: dict[str, list[tuple[str, EntryPoint]]] = {}
-    for name, points in found:
-        first.setdefault(one_name(name), points)
-    return tuple(point for points in first.values() for point in points)
+def _all(path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """Return those of the first distribution of each name: only that can be imported."""
+    first: dict[str, Path] = {}
+    for folder in (folder for place in path for folder in _information(place)):
+        first.setdefault(one_name(folder.name.partition("-")[0]), folder)
+    return tuple(point for folder in first.values() for point in _points(folder))
 
 
 def one_name(project: str) -> str:
@@ -127,7 +80,7 @@ def _information(place: str) -> Iterator[Path]:
     yield from (Path(place, name) for name in found)
 
 
-def _points(folder: Path) -> Iterator[ListedPoint]:
+def _points(folder: Path) -> Iterator[EntryPoint]:
     try:
         lines = (folder / LISTED).read_text(encoding="utf-8").splitlines()
     except OSError:  # most distributions offer nothing
@@ -138,4 +91,4 @@ def _points(folder: Path) -> Iterator[ListedPoint]:
             group = line[1:-1]
         elif line and not line.startswith("#"):
             name, _, value = line.partition("=")
-            yield ListedPoint(name.strip(), value.strip(), group, folder)
+            yield EntryPoint(name.strip(), value.strip(), group, folder)

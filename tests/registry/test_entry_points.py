@@ -4,7 +4,6 @@ import importlib
 import random
 import string
 import sys
-import zipfile
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -78,18 +77,7 @@ def test_what_is_installed_here_is_what_the_standard_library_says() -> None:
     assert len(entry_points_of("labcrane")) > 5
 
 
-def test_what_lies_in_a_zip_on_the_path_is_found_as_well(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    packed = tmp_path / "packed.zip"
-    with zipfile.ZipFile(packed, "w") as into:
-        into.writestr("lamp-1.0.dist-info/METADATA", "Metadata-Version: 2.1\nName: lamp\n")
-        into.writestr("lamp-1.0.dist-info/entry_points.txt", "[labcrane]\nlamp = lamp\n")
-    monkeypatch.syspath_prepend(packed)
-    assert ("lamp", "lamp") in {(each.name, each.value) for each in entry_points_of("labcrane")}
-
-
 @pytest.mark.parametrize("value", ["json", "json:dumps", "os.path:join", "json:JSONEncoder.encode"])
 def test_an_entry_point_gives_what_the_standard_library_gives_for_it(value: str) -> None:
-    own = reader.ListedPoint("it", value, "labcrane", Path())
+    own = reader.EntryPoint("it", value, "labcrane", Path())
     assert own.load() is EntryPoint("it", value, "labcrane").load()
