@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationInfo, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from labcrane import Machine, Settings
 from labcrane.core import (
@@ -16,7 +16,6 @@ from labcrane.core import (
     Reference,
     Unit,
     Usual,
-    was_run,
 )
 from labcrane_schemes.directions import (
     doubted_joints,
@@ -32,8 +31,6 @@ DIRECTIONS = {"base": ("x", "y", "z"), "arm": ("radial", "tangential", "vertical
 Direction = Annotated[str, Reference("direction of the frame", own=True)]
 """A direction in which the tip is moved."""
 
-
-FORMER_M_S = 0.5
 
 LARGEST_DEAD_ZONE = 0.5
 
@@ -130,14 +127,6 @@ class EndEffectorSettings(HandlingSettings):
     def directions(self, machine: Machine) -> Sequence[str]:
         return of_the_tip(self.map)
 
-    @model_validator(mode="before")
-    @classmethod
-    def _former(cls, written: object, info: ValidationInfo) -> object:
-        # What was recorded without a speed moved by a former default.
-        if was_run(info) and isinstance(written, Mapping):
-            return {"speed_m_s": FORMER_M_S, **written}
-        return written
-
 
 class SwitchableSettings(Settings):
     """Two schemes, and a button that changes between them during a trial."""
@@ -156,14 +145,6 @@ class SwitchableSettings(Settings):
 
     ramp_s: Annotated[NonNegativeFloat, Usual(0.01, 5.0)] = 0.5
     """Time over which a change goes from one scheme's command to the other's, in seconds."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _former(cls, written: object, info: ValidationInfo) -> object:
-        # What was recorded without a ramp changed at once.
-        if was_run(info) and isinstance(written, Mapping):
-            return {"ramp_s": 0.0, **written}
-        return written
 
     def provides(self, machine: Machine) -> Names:
         return {"scheme": ("joint_velocity", "end_effector")}

@@ -84,14 +84,6 @@ class SonificationSettings(Settings):
     device: int | None = None
     """PortAudio's number of the output device; the system's default device by default."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _former(cls, written: object, info: ValidationInfo) -> object:
-        # What was recorded without a weighting had none.
-        if was_run(info) and isinstance(written, Mapping):
-            return {"weighting": "none", **written}
-        return written
-
     @field_validator("device")
     @classmethod
     def _is_counted(cls, device: int | None, info: ValidationInfo) -> int | None:

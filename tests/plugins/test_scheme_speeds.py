@@ -27,7 +27,6 @@ from labcrane_aiming.aiming import Aiming
 from labcrane_aiming.settings import AimingSettings
 from labcrane_schemes.end_effector import EndEffector
 from labcrane_schemes.joint_velocity import JointVelocity
-from labcrane_schemes.settings import EndEffectorSettings, SwitchableSettings
 from labcrane_schemes.switchable import Switchable
 
 
@@ -116,11 +115,3 @@ def test_sticks_let_go_of_in_a_change_stop_the_machine_at_once() -> None:
     scheme.command(push(left_y=1), state)
     assert scheme.command(push(left_y=1, right_trigger=1), state)[:4].any()
     assert not scheme.command(push(right_trigger=1), state)[:4].any()
-
-
-def test_a_record_without_speed_or_ramp_moves_as_it_did() -> None:
-    tip, both = {"map": BASE}, {"button": "right.trigger", "joint_velocity": {"map": JOINTS}}
-    was = {"recorded": True}
-    assert EndEffectorSettings.model_validate(tip, context=was).speed_m_s == 0.5
-    found = SwitchableSettings.model_validate(both | {"end_effector": tip}, context=was)
-    assert (found.ramp_s, found.end_effector.speed_m_s) == (0.0, 0.5)

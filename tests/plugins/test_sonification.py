@@ -319,12 +319,6 @@ def test_a_level_of_1_that_weighting_lowers_where_there_are_overtones_can_be_pla
     assert (amplitude, distance) == (pytest.approx(1.0), pytest.approx(4.0))
 
 
-def test_what_was_recorded_without_a_weighting_had_none() -> None:
-    was_run = {"recorded": True}
-    assert SonificationSettings.model_validate({}, context=was_run).weighting == "none"
-    assert SonificationSettings.model_validate({}).weighting == "a"
-
-
 def test_the_shipped_groups_of_sphere_and_tone_are_told_the_same() -> None:
     tone_alone = SonificationSettings(pan="none", silent_after_s=None)
     assert tone_alone.reveals() == SphereSettings().reveals()

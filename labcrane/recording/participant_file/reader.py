@@ -375,8 +375,7 @@ class SessionRecord:
         import pandas as pd  # noqa: PLC0415
 
         with reading(self._path) as file:
-            group = file[self._group]  # sessions of older files have none
-            columns = _columns(group["questionnaires"]) if "questionnaires" in group else []
+            columns = _columns(file[f"{self._group}/questionnaires"])
             return pd.DataFrame({name: _values(dataset) for name, dataset in columns})
 
     @cached_property

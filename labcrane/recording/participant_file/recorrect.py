@@ -94,7 +94,7 @@ def read_stream(group: "h5py.Group") -> RecordedStream:
 
 
 def _own_clock(group: "h5py.Group") -> FloatArray:
-    """Return the recorder's log of its own clock; older files have none."""
+    """Return the recorder's log of its own clock; nothing where it kept none."""
     session = group.parent.parent
     if "own_clock" not in session:
         return np.empty((0, len(OWN_CLOCK_CHANNELS)))
