@@ -129,7 +129,7 @@ def test_an_item_called_as_a_column_leaves_that_column_as_it_is(exports: Path) -
 
 def test_questionnaires_of_alike_names_have_a_table_each(exports: Path) -> None:
     folder = exports / "bids" / "phenotype"
-    first, second = tsv(folder / "mood1.tsv"), tsv(folder / "mood1x.tsv")
+    first, second = tsv(folder / "mood1.tsv"), tsv(folder / "mood1x2.tsv")
     assert first["mood"].astype(float).tolist() == [4.0] * 3
     assert second["mood"].astype(float).tolist() == [8.0] * 3
     assert second["score_all"].astype(float).tolist() == [8.0] * 3
