@@ -273,14 +273,18 @@ def _along(movement: Movement, tip: FloatArray) -> float:
     return float((tip[-1] - tip[0]) @ axis / np.linalg.norm(axis))
 
 
+OF_STICKS = ("reversals", "simultaneous", "axes_used", "bimanual")
+"""Measures of sticks, whatever their number."""
+
+
 def _sticks(movement: Movement, span: slice, settings: MeasureSettings) -> dict[str, float]:
     axes = {
         name: values[span]
         for name, values in movement.axes.items()
         if name.rpartition(".")[2] in settings.stick_axes
     }
-    if not axes:
-        return {}
+    if not axes:  # keys, or a panel whose axes are called otherwise
+        return dict.fromkeys(OF_STICKS, float("nan"))
     seconds = (span.stop - span.start) / movement.rate_hz
     use = stick_use(axes, settings.dead_zone)
     turns = sum(reversals(values, settings.hysteresis) for values in axes.values())

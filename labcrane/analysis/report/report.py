@@ -346,8 +346,9 @@ def _movements(
     page.heading("Fitts' law and throughput")
     page.draw(figures.fitts(results))
     page.draw(figures.throughputs(throughput(results)))
-    page.heading("Use of the sticks")
-    page.draw(figures.sticks(results))
+    if results["simultaneous"].notna().any():
+        page.heading("Use of the sticks")
+        page.draw(figures.sticks(results))
 
 
 def _rests(results: "pd.DataFrame") -> str:
@@ -610,7 +611,8 @@ def _participant_page(
             page.sketch(figures.learning(results, curves, "movement_time"))
         page.sketch(figures.by_distance(results))
         page.sketch(figures.fitts(results))
-        page.sketch(figures.sticks(results))
+        if results["simultaneous"].notna().any():
+            page.sketch(figures.sticks(results))
         page.table("movements", results[["trial", "sequence", "distance", *SHOWN]])
     page.heading("Exclusions")
     page.table("excluded_movements", exclusions(own))
