@@ -1,6 +1,5 @@
 """The report of a study: one page, one page per participant, figures and tables."""
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -515,22 +514,22 @@ def _mixed(page: Page, results: "pd.DataFrame", measure: str) -> None:
 
 def _of_model(model: MixedModel) -> Iterator[str]:
     """Yield sentences on the model, and on what could not be modelled."""
-    modelled = f"the logarithm of {model.measure}" if model.log else model.measure
     without = f" ({model.missing} more have no value)" if model.missing else ""
-    slopes = not math.isnan(model.slope_sd)
-    spread = f", of slopes {model.slope_sd:.3g}" if slopes else ""
+    spread = ", ".join(f"{name} {sd:.3g}" for name, sd in model.random.items())
     yield (
-        f"Mixed model of {modelled}: {model.n} movements{without} of {model.participants} "
-        f"participants, {'with' if slopes else 'without'} a slope for each participant; standard "
-        f"deviation over participants of intercepts {model.participant_sd:.3g}{spread}, residual "
-        f"{model.residual_sd:.3g}; degrees of freedom after Satterthwaite."
+        f"Mixed model of {model.measure}: {model.formula}, sequence and difficulty centred; "
+        f"{model.n} movements{without} of {model.participants} participants. Standard deviations "
+        f"over participants: {spread or 'none'}; residual {model.residual_sd:.3g}; degrees of "
+        "freedom after Satterthwaite."
     )
     if model.measure in TIMES and not model.log:
         yield "It is modelled untransformed, since a value of 0 or less has no logarithm."
-    if model.boundary:
+    if model.zero:
+        yield f"Without random terms whose variance is estimated as zero: {', '.join(model.zero)}."
+    if model.inseparable:
         yield (
-            "The fit is at a boundary (singular): intercepts and slopes of participants do not "
-            "both vary by themselves."
+            "Without random terms that coincide with others or with the residual: "
+            f"{', '.join(model.inseparable)}."
         )
     if model.reference:
         yield (

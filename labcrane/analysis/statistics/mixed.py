@@ -1,13 +1,16 @@
-"""Linear mixed model of a measure of each movement, with differences between people.
+"""Linear mixed model of a measure of each movement, with the random terms of the design.
 
-Fitted as lme4 fits it (Bates, Mächler, Bolker & Walker 2015, Journal of Statistical Software 67:1):
-the restricted likelihood is profiled over all but the covariance of people's intercepts and slopes,
-which may end at a boundary. Tests are t tests with the degrees of freedom of Satterthwaite, as
-lmerTest makes them (Kuznetsova, Brockhoff & Christensen 2017, the same journal 82:13).
-statsmodels has the model as well, ends without a result at a boundary, and has tests of z alone.
+People differ in every effect that varies within them, so each has a variance over people (Barr,
+Levy, Scheepers & Tily 2013, Journal of Memory and Language 68:255): without it, movements of one
+person would count as independent tests of the effect. Fitted as lme4 fits it (Bates, Mächler,
+Bolker & Walker 2015, Journal of Statistical Software 67:1): the restricted likelihood is profiled
+over all but the variances relative to the residual. Tests are t tests with the degrees of freedom
+of Satterthwaite, as lmerTest makes them (Kuznetsova, Brockhoff & Christensen 2017, the same journal
+82:13).
 """
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -24,8 +27,18 @@ if TYPE_CHECKING:
 FIXED = ("sequence", "difficulty", "far_side")
 """Fixed terms of the model; one that does not vary is left out."""
 
-DESIGN = ("group", "phase")
-"""Further ones where a study has them; groups may learn in another way too."""
+DESIGN = ("group", "phase", "condition")
+"""Further ones where a study has them; groups may change in another way too."""
+
+RANDOM = {
+    "of_session": "participant:session", "of_block": "participant:block",
+    "condition": "participant:condition", "phase": "participant:phase",
+    "sequence": "participant", "far_side": "participant:far_side", "difficulty": "participant",
+}  # fmt: skip
+"""What people may differ over: columns and groupings, the first preferred where two coincide."""
+
+NO_CONDITION = "no condition"
+"""Level of blocks without a condition, beside others that have one."""
 
 TIMES = (
     "movement_time", "onset_to_rest", "circle_to_circle", "reaction_time", "movement_onset",
@@ -39,17 +52,14 @@ LEAST = 3
 DEPENDENT = 1e-8
 """Residual share of a column given those before it; below it, it is linearly dependent."""
 
-BOUNDARY = 1e-4
-"""Minimum eigenvalue of people's covariance relative to the residual; below it, it is zero."""
-
 LEAST_SCATTER = 1e-5
 """Share of the values' standard deviation; below it, rounding spoils the sums of squares."""
 
 FLAT = 1e-7
-"""Negligible difference of deviance."""
+"""Negligible difference of deviance: a variance that improves it by less is zero."""
 
-STARTS = ((1.0, 0.0, 1.0), (0.1, 0.0, 0.1), (0.1, 0.0, 0.01))
-"""Start values of the fit; the best result is used. Factors of the covariance over the residual."""
+STARTS = (1.0, 0.05)
+"""Start values of the variances over the residual; the best result is used."""
 
 
 class NoModelError(Exception):
@@ -60,10 +70,15 @@ class NoModelError(Exception):
 class MixedModel:
     """A linear mixed model of a measure, or of its logarithm.
 
-    ``measure ~ sequence + difficulty + far_side + (1 + sequence | participant)``, sequence
-    and difficulty centred; with groups also ``group * sequence``, with sessions or blocks
-    ``phase``, with both ``group * phase``. Terms of levels are differences from the first level,
-    so that ``sequence`` and ``phase`` are those of the first group where there are several.
+    Fixed are ``sequence + difficulty + far_side``, the two numbers centred; with groups also
+    ``group * sequence``, with sessions or blocks ``phase``, within participants ``condition``, each
+    by group. Random are the participant, and participant by each of these that varies within
+    people, and by session and block where both do: independent, each with one variance.
+
+    A random term is in the model if it adds to those before it within people and leaves movements
+    for the residual; one whose variance is estimated as zero is then left out, which changes no
+    estimate. Terms of levels are differences from the first level, so that ``sequence``, ``phase``
+    and ``condition`` are those of the first group where there are several.
 
     Attributes
     ----------
@@ -72,20 +87,21 @@ class MixedModel:
     log
         Whether its logarithm was: of :data:`TIMES`, unless a value is 0 or less. Other measures are
         modelled untransformed, since they have a sign, or a value of 0 that means something.
+    formula
+        The fitted model as lme4 writes it.
     terms
         One row per fixed term: term, estimate, standard error, t, Satterthwaite's degrees of
-        freedom, p.
+        freedom, p, and the terms left out that it cannot be distinguished from.
     dropped
         Terms that follow from the others here, as where one group lacks one phase; not estimated.
-    participant_sd
-        Standard deviation over participants of the intercept, of the logarithm if ``log``.
-    slope_sd
-        That of the slopes over the sequence; NaN where everybody has a single position.
+    random
+        Standard deviation over participants of each random term, of the logarithm if ``log``.
+    zero
+        Random terms left out because their variance is estimated as zero.
+    inseparable
+        Random terms left out because they coincide with others or with the residual.
     residual_sd
         That of the residuals.
-    boundary
-        Whether people's intercepts and slopes have a combination without any variance (lme4 calls
-        the fit singular). Estimates and tests hold; the standard deviations are at their bound.
     criterion
         The restricted deviance at the fit, as lme4 prints it; the lower, the better.
     n, participants
@@ -98,12 +114,13 @@ class MixedModel:
 
     measure: str
     log: bool
+    formula: str
     terms: "pd.DataFrame"
     dropped: tuple[str, ...]
-    participant_sd: float
-    slope_sd: float
+    random: Mapping[str, float]
+    zero: tuple[str, ...]
+    inseparable: tuple[str, ...]
     residual_sd: float
-    boundary: bool
     criterion: float
     n: int
     participants: int
@@ -133,45 +150,52 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel:
     if alike(y):
         raise NoModelError("all movements have the same value")
     names, columns = _columns(data)
-    kept = _independent(columns)
-    slopes = data["sequence"].nunique() > 1
-    places = data["sequence"].to_numpy(float) if slopes else np.empty((len(data), 0))
-    random = np.column_stack([np.ones(len(data)), places])
-    if len(data) <= len(kept) + random.shape[1] * people:
+    kept, behind = _independent(columns)
+    x = columns[:, kept]
+    ones = [np.asarray(rows) for rows in data.groupby("participant").indices.values()]
+    random, inseparable = _estimable(_of_people(data), x, ones)
+    if not random:
         raise NoModelError(
-            f"{len(data)} movements of {people} participants are too few for a mean and a slope of "
-            "each"
+            f"{len(data)} movements of {people} participants are too few for a mean of each"
         )
-    who = data["participant"].factorize()[0]
-    scatter = _scatter(columns[:, kept], y, random, who)
+    scatter = _scatter(x, y, np.column_stack(list(random.values())), ones)
     if scatter <= LEAST_SCATTER * float(y.std()):
         raise NoModelError(
-            "the terms and each participant's mean and slope fit every value exactly, so there is "
-            "no residual variance to test against"
+            "the terms and each participant's means and slopes fit every value exactly, so there "
+            "is no residual variance to test against"
         )
-    fit = _Fit(columns[:, kept], y, random, who, scatter)
-    t = fit.estimates / fit.errors
+    fit = _Fit(x, y, list(random.values()), ones, scatter)
+    errors, freedom = fit.errors, fit.freedom
+    t = fit.estimates / errors
     terms = pd.DataFrame(
         {
             "term": [names[at] for at in kept],
             "estimate": fit.estimates,
-            "se": fit.errors,
+            "se": errors,
             "t": t,
-            "df": fit.freedom,
-            "p": 2.0 * distribution.sf(np.abs(t), fit.freedom),
+            "df": freedom,
+            "p": 2.0 * distribution.sf(np.abs(t), freedom),
+            "confounded": [
+                " and ".join(names[left] for left, own in behind.items() if at in own)
+                for at in kept
+            ],
         }
     )
     groups = sorted(data["group"].unique()) if "group" in data else []
-    spread = np.sqrt(np.diag(fit.covariance))
+    deviations = dict(zip(random, fit.deviations.tolist(), strict=True))
+    there = {name: value for name, value in deviations.items() if value > 0.0}
+    response = f"log({measure})" if log else measure
+    fixed = dict.fromkeys(_plain(name) for name in terms["term"][1:])
     return MixedModel(
         measure,
         log,
+        f"{response} ~ {' + '.join([*fixed, *there]) or '1'}",
         terms,
-        dropped=tuple(name for at, name in enumerate(names) if at not in kept),
-        participant_sd=float(spread[0]),
-        slope_sd=float(spread[1]) if slopes else float("nan"),
+        dropped=tuple(names[at] for at in behind),
+        random=there,
+        zero=tuple(name for name in deviations if name not in there),
+        inseparable=inseparable,
         residual_sd=float(fit.sigma),
-        boundary=fit.boundary,
         criterion=fit.criterion,
         n=len(data),
         participants=people,
@@ -180,15 +204,24 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel:
     )
 
 
+def _plain(term: str) -> str:
+    """Return ``group:phase`` of ``group[T.visual]:phase[T.second]``."""
+    return re.sub(r"\[T\.[^\]]*\]", "", term)
+
+
 def _modelled(movements: "pd.DataFrame", measure: str) -> tuple["pd.DataFrame", bool]:
-    """Return the model's data, terms centred, and whether it is of the logarithm."""
-    names = [*FIXED, *(name for name in DESIGN if name in movements), "participant"]
-    table = movements[[measure, *names]].dropna()
+    """Return the model's data, numbers centred, and whether it is of the logarithm."""
+    own = [name for name in dict.fromkeys([*DESIGN, *RANDOM]) if name in movements]
+    names = list(dict.fromkeys([*FIXED, *own, "participant"]))
+    table = movements[[measure, *names]]
+    if "condition" in names:
+        table = table.fillna({"condition": ""}).replace({"condition": {"": NO_CONDITION}})
+    table = table.dropna()
     log = measure in TIMES and bool((table[measure] > 0.0).all())
     data = table[names].assign(y=np.log(table[measure]) if log else table[measure])
     for name in ("sequence", "difficulty"):
         data[name] -= data[name].mean()
-    return data, log
+    return data.reset_index(drop=True), log
 
 
 def _columns(data: "pd.DataFrame") -> tuple[list[str], FloatArray]:
@@ -201,7 +234,7 @@ def _columns(data: "pd.DataFrame") -> tuple[list[str], FloatArray]:
     terms = {"Intercept": np.ones(len(data))}
     for own in coded.values():
         terms |= own
-    for name in ("sequence", "phase"):
+    for name in ("sequence", "phase", "condition"):
         if {"group", name} <= set(coded):
             terms |= {
                 f"{group}:{other}": one * two
@@ -211,75 +244,132 @@ def _columns(data: "pd.DataFrame") -> tuple[list[str], FloatArray]:
     return list(terms), np.column_stack(list(terms.values()))
 
 
-def _coded(name: str, values: "pd.Series[Any]") -> dict[str, FloatArray]:
-    """Return a number unchanged, and one column for each level except the first."""
+def _is_number(values: "pd.Series[Any]") -> bool:
     from pandas.api.types import is_bool_dtype, is_numeric_dtype
 
-    if is_numeric_dtype(values) and not is_bool_dtype(values):
+    return is_numeric_dtype(values) and not is_bool_dtype(values)
+
+
+def _coded(name: str, values: "pd.Series[Any]") -> dict[str, FloatArray]:
+    """Return a number unchanged, and one column for each level except the first."""
+    if _is_number(values):
         return {name: values.to_numpy(float)}
-    levels = sorted(values.unique())
+    levels = sorted(values.unique(), key=lambda level: (level == NO_CONDITION, level))
     return {f"{name}[T.{level}]": (values == level).to_numpy(float) for level in levels[1:]}
 
 
-def _independent(columns: FloatArray) -> list[int]:
-    """Return which columns do not follow from those before them."""
+def _independent(columns: FloatArray) -> tuple[list[int], dict[int, list[int]]]:
+    """Return which columns do not follow from those before them, and what the others follow from.
+
+    The intercept, the first, is not named.
+    """
     kept: list[int] = []
+    behind: dict[int, list[int]] = {}
     for at in range(columns.shape[1]):
-        column = columns[:, at]
-        before = columns[:, kept]
-        rest = column - before @ np.linalg.lstsq(before, column, rcond=None)[0] if kept else column
-        if np.linalg.norm(rest) > DEPENDENT * np.linalg.norm(column):
+        column, before = columns[:, at], columns[:, kept]
+        weights = np.linalg.lstsq(before, column, rcond=None)[0] if kept else np.empty(0)
+        if np.linalg.norm(column - before @ weights) > DEPENDENT * np.linalg.norm(column):
             kept.append(at)
-    return kept
+        else:
+            of = zip(kept, np.abs(weights).tolist(), strict=True)
+            behind[at] = [one for one, weight in of if one and weight > DEPENDENT]
+    return kept, behind
 
 
-def _scatter(x: FloatArray, y: FloatArray, z: FloatArray, who: Any) -> float:
+def _of_people(data: "pd.DataFrame") -> dict[str, FloatArray]:
+    """Return the columns of one participant for each random term that the data vary in."""
+    found = {"(1 | participant)": np.ones((len(data), 1))}
+    of_phases = {"of_session", "of_block"}
+    several = of_phases <= {name for name in data if data[name].nunique() > 1}
+    for name, of in RANDOM.items():
+        if name not in data or (name in of_phases and not several):
+            continue
+        if _is_number(data[name]):
+            found[f"(0 + {name} | {of})"] = data[[name]].to_numpy(float)
+        else:
+            found[f"(1 | {of})"] = dummies(data[name].factorize()[0])
+    return found
+
+
+def _estimable(
+    terms: Mapping[str, FloatArray], x: FloatArray, ones: Sequence[Any]
+) -> tuple[dict[str, FloatArray], tuple[str, ...]]:
+    """Return the random terms that add to those before and leave a residual, and the others."""
+    basis = np.linalg.qr(x)[0]
+    kept: dict[str, FloatArray] = {}
+    rank = basis.shape[1]
+    for name, own in terms.items():
+        rows = _outside(basis, np.column_stack([*kept.values(), own]), ones)
+        now = sum(size for _, size in rows)
+        rest = np.concatenate([part for part, _ in rows])
+        now += int((np.linalg.eigvalsh(rest.T @ rest) > DEPENDENT).sum())
+        if rank < now < len(x):
+            kept[name], rank = own, now
+    return kept, tuple(name for name in terms if name not in kept and np.ptp(terms[name]) > 0.0)
+
+
+def _outside(
+    columns: FloatArray, z: FloatArray, ones: Sequence[Any]
+) -> list[tuple[FloatArray, int]]:
+    """Return what each participant's own columns ``z`` leave of ``columns``, and their rank."""
+    found = []
+    for rows in ones:
+        made, sizes, _ = np.linalg.svd(z[rows], full_matrices=False)
+        made = made[:, sizes > DEPENDENT * sizes.max(initial=0.0)]
+        found.append((columns[rows] - made @ (made.T @ columns[rows]), made.shape[1]))
+    return found
+
+
+def _scatter(x: FloatArray, y: FloatArray, z: FloatArray, ones: Sequence[Any]) -> float:
     """Return the standard deviation about the terms and people's own means and slopes."""
-    of_people = (dummies(who)[:, :, None] * z[:, None, :]).reshape(len(y), -1)
-    both = np.hstack([x, of_people])
-    rest = y - both @ np.linalg.lstsq(both, y, rcond=None)[0]
-    return float(rest.std())
+    parts = _outside(np.column_stack([x, y]), z, ones)
+    both = np.concatenate([part for part, _ in parts])
+    rest = both[:, -1] - both[:, :-1] @ np.linalg.lstsq(both[:, :-1], both[:, -1], rcond=None)[0]
+    return float(np.sqrt((rest**2).mean()))
 
 
 class _Fit:
     """The fit of ``y = x·b + z·u + e`` with u of each participant and e normal.
 
-    Everything is computed from cross products of each participant. Columns are scaled to about 1
-    and ``y`` to a residual of about 1 before, and results are scaled back.
+    Each random term has columns ``z`` of its own and one variance. Everything is computed from
+    cross products of each participant. Columns are scaled to about 1 and ``y`` to a residual of
+    about 1 before, and results are scaled back.
     """
 
     def __init__(
-        self, x: FloatArray, y: FloatArray, z: FloatArray, who: Any, scatter: float
+        self,
+        x: FloatArray,
+        y: FloatArray,
+        terms: Sequence[FloatArray],
+        ones: Sequence[Any],
+        scatter: float,
     ) -> None:
         self._n, self._p = x.shape
         self._x, self._back = np.linalg.qr(x)
         self._y_scale = scatter
-        self._z_scale = np.sqrt((z**2).mean(axis=0))
-        z = z / self._z_scale
+        self._z_scale = np.array([np.sqrt((own**2).sum(axis=1).mean()) for own in terms])
+        self._term = np.repeat(np.arange(len(terms)), [own.shape[1] for own in terms])
+        z = np.column_stack(list(terms)) / self._z_scale[self._term]
         first = self._x.T @ y
         rest = (y - self._x @ first) / self._y_scale  # better conditioned than y
         self._first = first
-        ones = [who == one for one in range(int(who.max()) + 1)]
         self._zz = np.stack([z[own].T @ z[own] for own in ones])
         self._zx = np.stack([z[own].T @ self._x[own] for own in ones])
         self._zy = np.stack([z[own].T @ rest[own] for own in ones])
         self._yy = float(rest @ rest)
-        self._theta = self._fitted()
-
-    def _factor(self, theta: FloatArray) -> FloatArray:
-        """Return the lower factor of people's covariance over the residual variance."""
-        size = self._zz.shape[1]
-        made = np.zeros((size, size))
-        made[np.tril_indices(size)] = theta
-        return made
+        self._theta = np.sqrt(self._fitted())
+        self._there = self._theta > 0.0
 
     def _solved(self, theta: FloatArray) -> tuple[float, FloatArray, FloatArray, float]:
-        """Return log determinants, x'V⁻¹x, the estimates, and the weighted sum of squares."""
-        factor = self._factor(theta)
-        inner = np.eye(len(factor)) + factor.T @ self._zz @ factor
+        """Return log determinants, x'V⁻¹x, the estimates, and the weighted sum of squares.
+
+        By the terms' standard deviations over the residual's.
+        """
+        factor = theta[self._term]
+        inner = np.eye(len(factor)) + factor[:, None] * self._zz * factor
         lower = np.linalg.cholesky(inner)
-        zx = np.linalg.solve(lower, factor.T @ self._zx)
-        zy = np.linalg.solve(lower, (self._zy @ factor)[..., None])[..., 0]
+        zx = np.linalg.solve(lower, factor[:, None] * self._zx)
+        zy = np.linalg.solve(lower, (self._zy * factor)[..., None])[..., 0]
         xvx = np.eye(self._p) - np.einsum("mqp,mqr->pr", zx, zx)
         xvy = -np.einsum("mqp,mq->p", zx, zy)
         estimates = np.linalg.solve(xvx, xvy)
@@ -287,38 +377,45 @@ class _Fit:
         logs = 2.0 * float(np.log(np.einsum("mqq->mq", lower)).sum())
         return logs + float(np.linalg.slogdet(xvx)[1]), xvx, estimates, squares
 
-    def _profiled(self, theta: FloatArray) -> float:
+    def _profiled(self, variances: FloatArray) -> float:
         """Return the deviance at its best residual variance, but for a constant."""
-        logs, _, _, squares = self._solved(theta)
+        logs, _, _, squares = self._solved(np.sqrt(variances))
         return float(logs + (self._n - self._p) * np.log(squares))
 
-    def _deviance(self, both: FloatArray) -> float:
-        """Return the deviance by factors of the covariance and the residual deviation."""
-        logs, _, _, squares = self._solved(both[:-1])
-        free = self._n - self._p
-        return float(logs + 2.0 * free * np.log(both[-1]) + squares / both[-1] ** 2)
+    def _slope(self, variances: FloatArray) -> FloatArray:
+        """Return the derivatives of the profiled deviance."""
+        factor = np.sqrt(variances)[self._term]
+        _, xvx, estimates, squares = self._solved(np.sqrt(variances))
+        inner = np.eye(len(factor)) + factor[:, None] * self._zz * factor
+        part = np.linalg.solve(inner, factor[:, None] * self._zz)  # of V⁻¹z = z - z·factor·part
+        left = np.eye(len(factor)) - factor[:, None] * part
+        zx = left.transpose(0, 2, 1) @ self._zx
+        zy = np.einsum("mpq,mp->mq", left, self._zy) - zx @ estimates
+        traces = np.einsum("mqp,mpq->mq", self._zz, left) - np.einsum(
+            "mqp,mqp->mq", zx @ np.linalg.inv(xvx), zx
+        )
+        each = (traces - (self._n - self._p) / squares * zy**2).sum(axis=0)
+        return np.asarray(np.bincount(self._term, each), float)
 
     def _fitted(self) -> FloatArray:
+        """Return the variances over the residual's."""
         from scipy.optimize import minimize
 
-        size = self._zz.shape[1]
-        bounds = [(0.0, None) if row == column else (None, None)
-                  for row, column in zip(*np.tril_indices(size), strict=True)]  # fmt: skip
-        starts = [start if size > 1 else start[:1] for start in STARTS]
+        size = len(self._z_scale)
         ends = [
             minimize(
-                self._profiled, np.array(start), method="L-BFGS-B", jac="3-point", bounds=bounds,
-                options={"ftol": 1e-12, "gtol": 1e-6},
+                self._profiled, np.full(size, start), method="L-BFGS-B", jac=self._slope,
+                bounds=[(0.0, None)] * size,
+                options={"ftol": 1e-14, "gtol": 1e-7, "maxiter": 1000},
             )
-            for start in dict.fromkeys(starts)
+            for start in STARTS
         ]  # fmt: skip
-        theta = np.asarray(min(ends, key=lambda end: float(end.fun)).x, float)
-        # The search slows down towards a boundary, along which the deviance is flat.
-        for at, (low, _) in enumerate(bounds):
-            edge = np.where(np.arange(len(theta)) == at, 0.0, theta)
-            if low is not None and self._profiled(edge) <= self._profiled(theta) + FLAT:
-                theta = edge
-        return theta
+        found = np.asarray(min(ends, key=lambda end: float(end.fun)).x, float)
+        for at in np.argsort(found):
+            edge = np.where(np.arange(size) == at, 0.0, found)
+            if self._profiled(edge) <= self._profiled(found) + FLAT:
+                found = edge
+        return found
 
     @cached_property
     def _sigma(self) -> float:
@@ -337,16 +434,9 @@ class _Fit:
         return self._sigma * self._y_scale
 
     @property
-    def covariance(self) -> FloatArray:
-        """Covariance of people's intercepts and slopes."""
-        factor = self._factor(self._theta) * self.sigma / self._z_scale[:, None]
-        return np.asarray(factor @ factor.T)
-
-    @property
-    def boundary(self) -> bool:
-        """Whether some combination of intercept and slope has no variance over people."""
-        factor = self._factor(self._theta)
-        return bool(np.sqrt(np.linalg.eigvalsh(factor @ factor.T).clip(0.0)).min() < BOUNDARY)
+    def deviations(self) -> FloatArray:
+        """Standard deviations over people of the random terms."""
+        return np.asarray(self._theta * self.sigma / self._z_scale)
 
     @property
     def estimates(self) -> FloatArray:
@@ -354,10 +444,26 @@ class _Fit:
         own = self._solved(self._theta)[2] * self._y_scale + self._first
         return np.linalg.solve(self._back, own)
 
+    @property
+    def _both(self) -> FloatArray:
+        """The deviations that are not zero, over the residual's, and the residual's."""
+        return np.array([*self._theta[self._there], self._sigma])
+
+    def _whole(self, both: FloatArray) -> FloatArray:
+        theta = np.zeros(len(self._theta))
+        theta[self._there] = both[:-1]
+        return theta
+
+    def _deviance(self, both: FloatArray) -> float:
+        """Return the deviance by the parameters that are not zero."""
+        logs, _, _, squares = self._solved(self._whole(both))
+        free = self._n - self._p
+        return float(logs + 2.0 * free * np.log(both[-1]) + squares / both[-1] ** 2)
+
     def _variances(self, both: FloatArray) -> FloatArray:
         """Return the fixed terms' variances by the parameters of the deviance."""
         inverse = np.linalg.inv(self._back)
-        spread = both[-1] ** 2 * np.linalg.inv(self._solved(both[:-1])[1])
+        spread = both[-1] ** 2 * np.linalg.inv(self._solved(self._whole(both))[1])
         return np.asarray(np.einsum("ij,jk,ik->i", inverse, spread, inverse))
 
     @property
@@ -366,16 +472,9 @@ class _Fit:
         return np.asarray(np.sqrt(self._variances(self._both)) * self._y_scale)
 
     @property
-    def _both(self) -> FloatArray:
-        return np.array([*self._theta, self._sigma])
-
-    @property
     def freedom(self) -> FloatArray:
         """Satterthwaite's degrees of freedom of the fixed terms."""
-        values, vectors = np.linalg.eigh(_hessian(self._deviance, self._both))
-        positive = values > BOUNDARY * values.max()
-        chosen = vectors[:, positive]
-        spread = 2.0 * (chosen / values[positive]) @ chosen.T
+        spread = 2.0 * np.linalg.inv(_hessian(self._deviance, self._both))
         slopes = _slopes(self._variances, self._both)
         variances = self._variances(self._both)
         return np.asarray(2.0 * variances**2 / np.einsum("ki,kl,li->i", slopes, spread, slopes))

@@ -1,0 +1,312 @@
+"""The mixed model of drawn people: against lmerTest, analysis of variance, and its own p."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from labcrane.analysis.report import outcomes
+from labcrane.analysis.report.factors import factors_of, with_factors
+from labcrane.analysis.statistics.anova import analyse
+from labcrane.analysis.statistics.mixed import NoModelError, mixed_model
+from results.consumers import needs_emmeans, r, table
+from results.synthetic import cohort_of_36
+
+TAILS = 4.0
+"""Degrees of freedom of the t distribution that people's differences and errors are drawn from."""
+
+
+def drawn(
+    seed: int,
+    *,
+    people: int = 16,
+    groups: tuple[str, ...] = ("none",) * 8 + ("visual",) * 8,
+    sessions: int = 1,
+    blocks: int = 2,
+    conditions: str = "",
+    differ: float = 0.4,
+    lost: float = 0.0,
+    absent: float = 0.0,
+) -> pd.DataFrame:
+    """Return movements of people who differ in all that varies within them, without any effect.
+
+    Deviations of a person in a session, block, condition, side, and slopes over sequence and
+    difficulty, and errors, are of one t distribution; ``differ`` is their size for what blocks and
+    conditions are. ``lost`` movements and ``absent`` phases are not there.
+    """
+    dice = np.random.default_rng([17, seed])
+
+    def own(size: float, *shape: int) -> Any:
+        return size * dice.standard_t(TAILS, shape) * math.sqrt((TAILS - 2.0) / TAILS)
+
+    rows = []
+    for who in range(people):
+        mean, side, slope, harder = own(1.0), own(0.2, 2), own(0.03), own(0.1)
+        of_session, of_phase = own(differ, sessions), own(differ, sessions, blocks)
+        of_block, of_condition = own(differ, blocks), own(differ, len(conditions) or 1)
+        for phase, (session, block) in enumerate(np.ndindex(sessions, blocks)):
+            if phase and dice.random() < absent:
+                continue
+            turn = (phase + who) % (len(conditions) or 1)
+            for place, pair in enumerate(dice.permutation(8)):
+                if dice.random() < lost:
+                    continue
+                y = mean + of_phase[session, block] + of_condition[turn] + side[pair % 2]
+                y += slope * place + (0.5 + harder) * (pair // 2) + own(0.5)
+                y += (of_session[session] + of_block[block]) * (sessions > 1)
+                rows.append(
+                    {"participant": f"P{who:03}", "group": groups[who % len(groups)],
+                     "phase": f"{phase + 1}", "of_session": f"{session}", "of_block": f"{block}",
+                     "condition": conditions[turn : turn + 1], "sequence": place + 1.0,
+                     "difficulty": 2.0 + 0.7 * (pair // 2), "far_side": ("left", "right")[pair % 2],
+                     "y": float(y)}
+                )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+UNEQUAL = ("none",) * 11 + ("visual",) * 5
+DESIGNS: dict[str, dict[str, Any]] = {
+    "two groups before and after": {},
+    "few people": {"people": 8, "groups": ("none", "visual")},
+    "unequal groups with missing cells": {"groups": UNEQUAL, "lost": 0.2, "absent": 0.15},
+    "three blocks with missing cells": {"blocks": 3, "lost": 0.2, "absent": 0.1},
+    "people who hardly differ": {"differ": 0.1},
+    "people who do not differ": {"differ": 0.0},
+    "a crossover": {"groups": ("",), "conditions": "uv"},
+    "a crossover of four blocks": {"groups": ("",), "conditions": "uv", "blocks": 4},
+    "a crossover of three": {"groups": ("",), "conditions": "uvw", "blocks": 3, "people": 18},
+    "a crossover of two groups": {"conditions": "uv", "lost": 0.1},
+    "blocks in sessions": {"groups": ("",), "sessions": 2},
+}
+"""Studies of people without an effect."""
+
+IN_R = {
+    "two groups before and after": "group * phase + group:s + (1 | participant:phase)",
+    "unequal groups with missing cells": "group * phase + group:s + (1 | participant:phase)",
+    "three blocks with missing cells": "group * phase + group:s + (1 | participant:phase)",
+    "people who do not differ": "group * phase + group:s + (1 | participant:phase)",
+    "a crossover": "phase + condition + (1 | participant:condition)",
+    "a crossover of four blocks": "phase + condition + (1 | participant:condition)"
+    " + (1 | participant:phase)",
+    "a crossover of two groups": "group * (s + phase + condition) + (1 | participant:condition)",
+    "blocks in sessions": "phase + (1 | participant:of_session) + (1 | participant:of_block)"
+    " + (1 | participant:phase)",
+}
+"""What lmerTest is told of a design, besides what every design has."""
+
+LMERTEST = """
+suppressMessages(library(lmerTest))
+d <- read.csv(commandArgs(TRUE)[1], colClasses = c(phase = "character"))
+say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
+for (cohort in unique(d$cohort)) {
+  own <- d[d$cohort == cohort, ]
+  own$s <- own$sequence - mean(own$sequence); own$b <- own$difficulty - mean(own$difficulty)
+  model <- as.formula(paste("y ~ s + b + far_side + (1 | participant) + (0 + s | participant)",
+    "+ (0 + b | participant) + (1 | participant:far_side) +", own$design[1]))
+  mm <- suppressWarnings(suppressMessages(lmer(model, own,
+    control = lmerControl(optimizer = "bobyqa", optCtrl = list(rhoend = 1e-9)))))
+  found <- coef(summary(mm))
+  for (term in rownames(found)) {
+    parts <- strsplit(term, ":")[[1]]
+    say(paste(cohort, paste(sort(parts, method = "radix"), collapse = ":")), found[term, ])
+  }
+  say(paste(cohort, "fit"), REMLcrit(mm), isSingular(mm))
+}
+"""
+
+
+def of_r(term: str) -> str:
+    """Return a term as R names it: ``groupvisual:phase2``; the parts in any order."""
+    named = {"Intercept": "(Intercept)", "sequence": "s", "difficulty": "b"}
+    parts = [named.get(part, part) for part in term.replace("[T.", "").replace("]", "").split(":")]
+    return ":".join(sorted(parts))
+
+
+@pytest.mark.slow
+@needs_emmeans
+def test_the_mixed_model_is_that_of_lmertest_in_designs_of_any_kind(tmp_path: Path) -> None:
+    cohorts = {
+        f"{name} {at}": drawn(at, **DESIGNS[name]).assign(design=model)
+        for name, model in IN_R.items()
+        for at in range(5)
+    }
+    path = tmp_path / "movements.csv"
+    pd.concat([own.assign(cohort=name) for name, own in cohorts.items()]).to_csv(path, index=False)
+    theirs = {key: np.array(found, float) for key, found in table(r(LMERTEST, path)).items()}
+    singular = equal = 0
+    for name, own in cohorts.items():
+        model = mixed_model(own, "y")
+        assert (model.log, model.n, model.missing) == (False, len(own), 0)
+        criterion, is_singular = theirs[f"{name} fit"]
+        # Near a boundary lmer stops early in some; ours may be a better fit, never a worse one.
+        assert model.criterion < criterion + 1e-6, name
+        singular += bool(model.zero)
+        if model.criterion < criterion - 1e-6:
+            continue
+        equal += 1
+        assert bool(model.zero) == is_singular, name
+        terms = model.terms[["estimate", "se", "df", "t", "p"]].to_numpy(float)
+        there = np.array([theirs[f"{name} {of_r(term)}"] for term in model.terms["term"]])
+        off = np.abs(terms[:, 0] - there[:, 0]) / there[:, 1]
+        assert off.max() < 2e-3, name
+        np.testing.assert_allclose(terms[:, 1], there[:, 1], rtol=2e-3, err_msg=name)
+        np.testing.assert_allclose(terms[:, 2], there[:, 2], rtol=2e-2, err_msg=name)
+        np.testing.assert_allclose(terms[:, 4], there[:, 4], atol=1e-3, err_msg=name)
+    assert 0 < singular < len(cohorts), "both kinds are drawn"
+    assert equal > 0.9 * len(cohorts)
+
+
+def significant(design: str, cohorts: range) -> pd.DataFrame:
+    """Return which terms are below .05, one row per cohort; the difficulty is no null term."""
+    rows = [mixed_model(drawn(at, **DESIGNS[design]), "y").terms for at in cohorts]
+    found = [own.set_index("term")["p"].drop(["Intercept", "difficulty"]) < 0.05 for own in rows]
+    return pd.DataFrame(found).astype(float)
+
+
+@pytest.mark.slow
+def test_what_does_not_vary_is_found_in_five_per_cent_of_cohorts() -> None:
+    found = significant("two groups before and after", range(100, 200))
+    assert len(found.columns) == 6
+    assert 0.03 < found.mean(axis=None) < 0.07
+    assert found.mean().max() < 0.12  # 5 of 100 are expected; 12 come in one of 250 tries
+
+
+@pytest.mark.long
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("design", DESIGNS)
+def test_the_table_of_type_i_errors(design: str) -> None:
+    found = significant(design, range(1_000, 2_000)).mean()
+    assert found.between(0.03, 0.07).all(), found.to_string()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("differ", [0.0, 0.2, 0.5])
+def test_in_a_balanced_design_the_model_and_the_analysis_of_variance_agree(differ: float) -> None:
+    """Where people differ from phase to phase by less than chance, the model pools, and only there.
+
+    The mean square of participants by phase is then below that of the residual.
+    """
+    pooled = 0
+    for at in range(12):
+        both = drawn(at, differ=differ)
+        model = mixed_model(both, "y")
+        rows = {row.factor: row for row in analyse(both, "y", ["phase"], ["group"])}
+        theirs = rows["group:phase"]
+        ours = model.terms.set_index("term").loc["group[T.visual]:phase[T.2]"]
+        if "(1 | participant:phase)" in model.random:
+            assert (ours["t"] ** 2, ours["df"]) == pytest.approx((theirs.f, theirs.df2), rel=1e-3)
+            assert ours["p"] == pytest.approx(theirs.p, abs=1e-3)
+            continue
+        pooled += 1
+        assert "(1 | participant:phase)" in model.zero
+        wide = both.groupby(["group", "participant", "phase"])["y"].mean().unstack("phase")
+        change = wide["2"] - wide["1"]
+        within = change - change.groupby("group").transform("mean")
+        assert 8 * (within**2).sum() / (2 * 14) < model.residual_sd**2 * (1.0 + 1e-6)
+        assert ours["df"] > theirs.df2
+    assert pooled == 0 if differ == 0.5 else pooled < 12
+
+
+def test_conditions_of_blocks_in_one_order_are_said_to_be_one_with_the_blocks() -> None:
+    crossed = drawn(3, groups=("",), conditions="uv")
+    model = mixed_model(crossed, "y")
+    assert model.dropped == ()
+    assert model.inseparable == ("(1 | participant:phase)",)
+    assert "condition + (1 | participant)" in model.formula
+    alike = crossed.assign(condition=crossed["phase"].map({"1": "u", "2": "v"}))
+    model = mixed_model(alike, "y")
+    assert model.dropped == ("condition[T.v]",)
+    confounded = model.terms.set_index("term")["confounded"]
+    assert confounded[confounded != ""].to_dict() == {"phase[T.2]": "condition[T.v]"}
+
+
+def test_blocks_without_a_condition_are_no_reference_of_conditions() -> None:
+    crossed = drawn(5, groups=("",), conditions="uv", blocks=2)
+    before = crossed[crossed["phase"] == "1"].assign(phase="0", condition=np.nan)
+    model = mixed_model(pd.concat([before, crossed]), "y")
+    assert set(model.terms["term"][4:]) == {"phase[T.1]", "phase[T.2]", "condition[T.v]"}
+    assert model.dropped == ("condition[T.no condition]",)
+
+
+@pytest.fixture(scope="module")
+def two_groups() -> pd.DataFrame:
+    """Two groups in two phases; the second phase changes the signed error of one of them."""
+    parts = [cohort_of_36(seed).assign(phase=name) for seed, name in ((7, "first"), (8, "second"))]
+    both = pd.concat(parts, ignore_index=True)
+    visual = both["participant"].str[1:].astype(int) % 2 == 0
+    both["group"] = np.where(visual, "visual", "none")
+    dice = np.random.default_rng(3)
+    own = both["participant"].map(dict.fromkeys(sorted(set(both["participant"])), 0.0))
+    for name in sorted(set(both["participant"])):
+        own[both["participant"] == name] = dice.normal(0.0, 0.03)
+    both["error_along"] += own + 0.06 * (visual & (both["phase"] == "second"))
+    both["sparc"] = -1.8 - 0.1 * both["difficulty"] + own + dice.normal(0.0, 0.05, len(both))
+    return both
+
+
+@pytest.mark.parametrize("value", [0.0, 0.1, 0.1 + 0.2, 7.3])
+@pytest.mark.parametrize("missing", [0, 9])
+def test_a_measure_that_is_the_same_in_all_is_tested_by_nothing(
+    two_groups: pd.DataFrame, value: float, missing: int
+) -> None:
+    few = two_groups[two_groups["participant"] <= "P008"].reset_index(drop=True)
+    few = few.assign(session=few["phase"].map({"first": 1.0, "second": 2.0}))
+    constant = pd.Series(value, few.index)
+    constant[np.random.default_rng(5).choice(few.index, missing, replace=False)] = np.nan
+    table = with_factors(few.drop(columns="phase").assign(constant=constant, practice=0.0))
+    factors, asked = factors_of(table), ["constant"]
+    for made in (
+        outcomes.anova_table(table, factors, asked),
+        outcomes.contrast_table(table, factors, asked),
+        outcomes.trend_table(table, factors, asked),
+        *outcomes.time_scale_tables(table, factors, asked),
+    ):
+        assert set(made["measure"]) - {"constant"}, "other measures are tested"
+        own = made[made["measure"] == "constant"]
+        assert own["p"].isna().all()
+    with pytest.raises(NoModelError, match="all movements have the same value"):
+        mixed_model(table, "constant")
+
+
+@pytest.mark.parametrize(
+    ("values", "why"),
+    [
+        (lambda t: 2.0 * t["difficulty"], "no residual variance"),
+        (lambda t: t["participant"].factorize()[0] * 0.1, "no residual variance"),
+        (lambda t: t["participant"].factorize()[0] * t["sequence"], "no residual variance"),
+        (lambda t: t["sequence"] / 3.0, "no residual variance"),
+        (lambda t: (t["group"] == "visual") * 1.0, "no residual variance"),
+        (lambda t: t["y"].where(t["y"] < t["y"].max(), np.inf), "some values are infinite"),
+    ],
+)
+def test_a_measure_without_scatter_has_no_model_and_says_why(
+    values: Callable[[pd.DataFrame], pd.Series], why: str
+) -> None:
+    cohort = drawn(12)
+    with pytest.raises(NoModelError, match=why):
+        mixed_model(cohort.assign(y=values(cohort)), "y")
+
+
+def test_a_time_of_0_is_kept_and_the_time_modelled_as_it_is(two_groups: pd.DataFrame) -> None:
+    few = two_groups[two_groups["participant"] <= "P006"].reset_index(drop=True)
+    zero = few.assign(reaction_time=few["movement_time"].where(few.index != 5, 0.0))
+    model = mixed_model(zero, "reaction_time")
+    assert (model.log, model.n) == (False, len(few))
+    assert mixed_model(few.assign(reaction_time=few["movement_time"]), "reaction_time").log
+
+
+def test_groups_that_lack_a_phase_are_modelled_without_their_interaction(
+    two_groups: pd.DataFrame,
+) -> None:
+    few = two_groups[two_groups["participant"] <= "P010"]
+    model = mixed_model(few, "movement_time")
+    assert "group[T.visual]:phase[T.second]" in set(model.terms["term"])
+    lacking = few[(few["group"] == "none") | (few["phase"] == "first")]
+    model = mixed_model(lacking, "movement_time")
+    assert "phase[T.second]" in set(model.terms["term"])
+    assert "group[T.visual]:phase[T.second]" not in set(model.terms["term"])
+    assert model.dropped == ("group[T.visual]:phase[T.second]",)
