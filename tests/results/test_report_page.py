@@ -157,10 +157,10 @@ def test_the_answer_has_design_people_effects_quality_and_exclusions_with_their_
     lost = movements.assign(outcome=["timeout", *["success"] * (len(movements) - 1)])
     found = told(lost, data)
     assert list(found) == [
-        "Design", "Participants", "Main effects", "Data quality", "Exclusions",
+        "Design", "Participants", "Effects", "Data quality", "Exclusions",
     ]  # fmt: skip
     assert "3 groups (none, sound, visual)" in found["Design"][0]
-    time = found["Main effects"][0]
+    time = found["Effects"][0]
     kept = lost[lost["outcome"] == "success"]
     for distance in (2.0, 3.0, 4.0, 6.0):
         own = kept[kept["distance"] == distance].groupby("participant")["movement_time"].mean()
@@ -201,7 +201,7 @@ def test_the_answer_gives_the_plain_test_of_the_primary_outcome_and_names_the_ad
     movements: pd.DataFrame, data: Path
 ) -> None:
     table = movements.drop(columns="group")
-    time, error = told(table, data, primary=("absolute_error",))["Main effects"][1::-1]
+    time, error = told(table, data, primary=("absolute_error",))["Effects"][1::-1]
     assert error.startswith("Primary outcome: The distance from the target's centre ")
     assert time.startswith("Further outcome: ")
     for said, measure in ((time, "movement_time"), (error, "absolute_error")):
@@ -213,14 +213,14 @@ def test_the_answer_gives_the_plain_test_of_the_primary_outcome_and_names_the_ad
 
 
 def test_without_primary_outcomes_none_is_called_so(movements: pd.DataFrame, data: Path) -> None:
-    assert "rimary" not in "".join(told(movements, data)["Main effects"])
+    assert "rimary" not in "".join(told(movements, data)["Effects"])
 
 
 def test_positions_of_phases_of_other_lengths_are_in_the_answer(
     movements: pd.DataFrame, data: Path
 ) -> None:
     second = movements[movements["sequence"] <= 5].assign(session=2.0)
-    said = told(pd.concat([movements, second]), data)["Main effects"][0]
+    said = told(pd.concat([movements, second]), data)["Effects"][0]
     for phase, last in (("1 session 1", 8), ("2 session 2", 5)):
         assert re.search(rf"over sequence in {phase} \(position 1: [^;]*, position {last}: ", said)
 

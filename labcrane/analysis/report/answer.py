@@ -17,17 +17,19 @@ from labcrane.analysis.report.factors import (
     Factors,
     with_factors,
 )
-from labcrane.analysis.report.outcomes import ADJUSTED, SEQUENCE, named_factor
+from labcrane.analysis.report.outcomes import ADJUSTED, SEQUENCE, named_factor, questions
 from labcrane.analysis.report.shortfalls import people_in_words
 from labcrane.analysis.report.words import (
-    LEVEL,
     LOOKED,
     NAMES,
     STYLES,
     UNBALANCED,
     Results,
+    depends,
     f_test,
     lacking,
+    rows_of,
+    verdict,
 )
 
 if TYPE_CHECKING:
@@ -60,7 +62,7 @@ def answer(
     return {
         "Design": [_design(cohort, everything, results)],
         "Participants": [about, *_left_out(cohort), *_untested(results)],
-        "Main effects": _effects(everything, results),
+        "Effects": _effects(everything, results),
         "Data quality": list(_quality(*quality)),
         "Exclusions": [_exclusions(everything)],
     }
@@ -130,15 +132,20 @@ def _effects(everything: "pd.DataFrame", results: Results | None) -> list[str]:
     whole = with_factors(everything)
     counted = whole[is_result(whole)]
     found = []
+    told = [(":".join(names), columns, "") for names, columns in questions(results.factors)]
+    told += [(name, (column,), unit) for name, column, unit in _columns(results.factors)]
     measures = [table["measure"] for table in (results.anova, results.shortfalls) if len(table)]
     for measure in dict.fromkeys(name for names in measures for name in names):
         if measure not in counted or str(measure).startswith(tuple(LOOKED)):
             continue  # a questionnaire's, or of gaze
+        of_it = rows_of(results.anova, str(measure))
+        others = depends(of_it)
         said = [
-            _effect(row, counted, column, unit, results)
-            for name, column, unit in _columns(results.factors)
-            if column in counted
-            for row in _tests_of(name, str(measure), results)
+            _effect(row, counted, columns, unit, results) + others.get(str(row["factor"]), "")
+            for name, columns, unit in told
+            if set(columns) <= set(counted)
+            for row in of_it
+            if _factor_of(str(row["factor"])) == name
         ]
         short = lacking(_of_effects(results), str(measure), STYLE)
         if said or short:
@@ -170,17 +177,12 @@ def _factor_of(effect: str) -> str:
     return effect.partition(" ")[0]
 
 
-def _tests_of(name: str, measure: str, results: Results) -> Iterator[Mapping[str, Any]]:
-    """Yield the tests of a factor: the plain one, as papers print it, and then adjusted ones."""
-    own = results.anova
-    rows = own[own["measure"] == measure].to_dict("records") if len(own) else []
-    for row in rows:
-        if _factor_of(str(row["factor"])) == name:
-            yield {str(key): value for key, value in row.items()}
-
-
 def _effect(
-    row: Mapping[str, Any], counted: "pd.DataFrame", column: str, unit: str, results: Results
+    row: Mapping[str, Any],
+    counted: "pd.DataFrame",
+    columns: Sequence[str],
+    unit: str,
+    results: Results,
 ) -> str:
     """Return ``differed over distance (2 m: 3.21 s, 6 m: 5.40 s; F(1, 35) = 90.1, p < .001)``.
 
@@ -189,29 +191,34 @@ def _effect(
     name, measure = str(row["factor"]), str(row["measure"])
     if row["confounded"]:
         return f"the effect of {name} cannot be distinguished from {row['confounded']}"
-    said = "differed over" if row["p_gg"] < LEVEL else "did not detectably differ over"
+    said, test = verdict(row, STYLE), f_test(row, STYLE, results.people)
     if name.endswith(ADJUSTED):  # the means are those of the plain test, before it
-        return f"{said} {name} ({f_test(row, STYLE, results.people)})"
+        return f"{said} ({test})"
     phase = name.removeprefix(f"{SEQUENCE} in ") if name.startswith(f"{SEQUENCE} in ") else ""
     own = counted[counted[PHASE] == phase] if phase else counted
     own = own[~own["participant"].isin(str(row["left_out"]).split())]
-    by = [column, "participant"]
-    within = [each for each in results.factors.over_phases if each != column]
-    if column == CONDITION:  # each has its own phases, and a test of the means of all trials
+    within = [each for each in results.factors.over_phases if each not in columns]
+    if CONDITION in columns:  # each has its own phases, and a test of the means of all trials
         own, within = own[own[CONDITION].fillna("") != ""], []
-    cells = own.groupby([*by, *within])[measure].mean().dropna()
-    each = cells.groupby(level=by).mean().groupby(level=0)
+    cells = own.groupby([*columns, "participant", *within])[measure].mean().dropna()
+    by = list(range(len(columns)))
+    each = cells.groupby(level=[*columns, "participant"]).mean().groupby(level=by)
     means, sizes = each.mean(), dict(each.size())
-    if column == PLACE and len(means) > 2:  # noqa: PLR2004 - the first and the last are enough
+    if columns == (PLACE,) and len(means) > 2:  # noqa: PLR2004 - the first and the last are enough
         means = means.iloc[[0, -1]]
-    of = "position " if column == PLACE else ""
     levels = ", ".join(
-        f"{of}{f'{level:g}' if isinstance(level, float) else level}{unit}"
-        f"{f', n = {sizes[level]}' if column == GROUP else ''}: "
+        f"{_level(at, columns)}{unit}{f', n = {sizes[at]}' if columns == (GROUP,) else ''}: "
         f"{results.quantity(f'{mean:.3g}', measure)}"
-        for level, mean in means.items()
+        for at, mean in means.items()
     )
-    return f"{said} {name} ({levels}; {f_test(row, STYLE, results.people)})"
+    return f"{said} ({levels}; {test})"
+
+
+def _level(at: Any, columns: Sequence[str]) -> str:
+    """Return a level of a factor, or of several: ``position 3``, ``control 1 pre-test``."""
+    parts = at if isinstance(at, tuple) else (at,)
+    words = [f"{part:g}" if isinstance(part, float) else str(part) for part in parts]
+    return " ".join([*(["position"] if columns == (PLACE,) else []), *words])
 
 
 def _quality(loops: "pd.DataFrame", syncs: "pd.DataFrame") -> Iterator[str]:

@@ -180,6 +180,21 @@ def named_factor(name: str, factors: Factors) -> str:
     return ":".join(words.get(part, part) for part in effect.split(":")) + separator + rest
 
 
+def questions(factors: Factors) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """Return the interactions that the design asks about, by names and columns.
+
+    With groups, whether what varies within people has another effect in each of them.
+    """
+    phases = tuple(factors.over_phases)
+    within: list[tuple[str, ...]] = [(CONDITION,)] if factors.conditions else []
+    within += [*((name,) for name in phases), *([phases] if len(phases) > 1 else [])]
+    return [
+        ((GROUP, *(named_factor(name, factors) for name in columns)), (GROUP, *columns))
+        for columns in within
+        if factors.groups
+    ]
+
+
 def plans(results: "pd.DataFrame", factors: Factors) -> Iterator[Plan]:
     """Yield the plans of every outcome."""
     phases = tuple(factors.over_phases)

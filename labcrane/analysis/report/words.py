@@ -1,11 +1,12 @@
 """Results in APA style, in HTML, Markdown and LaTeX."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.report.factors import GROUP, PHASE, Factors
+from labcrane.analysis.report.outcomes import questions
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -146,16 +147,21 @@ def paragraphs(results: Results, style: Style) -> list[str]:
     if results.factors.uneven:
         found[0] += f" {style.plain(results.factors.uneven)}"
     tests = (results.anova, results.gaze, results.scores, results.shortfalls)
+    asked = [":".join(names) for names, _ in questions(results.factors)]
     for measure in dict.fromkeys(name for table in tests for name in _measures(table)):
-        effects = [row for table in tests[:3] for row in _of(table, measure)]
-        name = style.plain(NAMES.get(measure, _looked(measure)))
-        sentences = [_effect(row, style, results.people) for row in effects]
+        effects = [row for table in tests[:3] for row in rows_of(table, measure)]
+        effects.sort(key=lambda row: row["factor"] not in asked)
+        name, others = style.plain(NAMES.get(measure, _looked(measure))), depends(effects)
+        sentences = [
+            _effect(row, style, results.people) + style.plain(others.get(row["factor"], ""))
+            for row in effects
+        ]
         text = "; ".join(sentences) or "was not tested by an analysis of variance"
         more = lacking(results.shortfalls, measure, style)
         for table, words in (
             (results.trends, _trend), (results.scales, _scale), (results.contrasts, _contrast),
         ):  # fmt: skip
-            more += [words(row, style, results) for row in _of(table, measure)]
+            more += [words(row, style, results) for row in rows_of(table, measure)]
         found.append(" ".join([f"{name} {text}.", *filter(None, more)]))
     return found
 
@@ -163,7 +169,7 @@ def paragraphs(results: Results, style: Style) -> list[str]:
 def lacking(shortfalls: "pd.DataFrame", measure: str, style: Style) -> list[str]:
     """Return sentences on the shortfalls of a measure's tests: each reason once."""
     factors: dict[tuple[str, str], list[str]] = {}
-    for row in _of(shortfalls, measure):
+    for row in rows_of(shortfalls, measure):
         factors.setdefault((str(row["without"]), str(row["why"])), []).append(str(row["factor"]))
     found = []
     for (without, why), names in factors.items():
@@ -187,7 +193,8 @@ def _looked(outcome: str) -> str:
     return outcome
 
 
-def _of(table: "pd.DataFrame", measure: str) -> list[dict[str, Any]]:
+def rows_of(table: "pd.DataFrame", measure: str) -> list[dict[str, Any]]:
+    """Return a measure's rows of a table."""
     if not len(table):
         return []
     rows = table[table["measure"] == measure].to_dict("records")
@@ -241,16 +248,32 @@ def f_test(row: Mapping[str, Any], style: Style, people: int) -> str:
     )
 
 
-def _effect(row: Mapping[str, Any], style: Style, people: int) -> str:
+def verdict(row: Mapping[str, Any], style: Style) -> str:
+    """Return ``differed over distance``, or ``there was an interaction of group and block``."""
     effect, _, rest = str(row["factor"]).partition(" ")
-    found = row["p_gg"] < LEVEL
-    where = (f" {style.plain(rest)}" if rest else "") + _confounded(row)
+    names = style.plain(" and ".join(effect.split(":")) + (f" {rest}" if rest else ""))
     if ":" in effect:
-        names = style.plain(" and ".join(effect.split(":")))
-        said = "there was an interaction" if found else "no interaction was found"
-        return f"{said} of {names}{where}, {f_test(row, style, people)}"
-    said = "differed" if found else "did not detectably differ"
-    return f"{said} over {style.plain(effect)}{where}, {f_test(row, style, people)}"
+        said = "there was an interaction" if row["p_gg"] < LEVEL else "no interaction was found"
+        return f"{said} of {names}"
+    return f"{'differed' if row['p_gg'] < LEVEL else 'did not detectably differ'} over {names}"
+
+
+def depends(tests: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Return what is said of each main effect whose factor is in an interaction that was found."""
+    others: dict[str, list[str]] = {}
+    for row in tests:
+        parts = str(row["factor"]).partition(" ")[0].split(":")
+        if len(parts) > 1 and row["p_gg"] < LEVEL and not row.get("confounded"):
+            for part in parts:
+                others.setdefault(part, []).extend(other for other in parts if other != part)
+    return {
+        name: f", on average: it depends on {' and '.join(dict.fromkeys(found))}"
+        for name, found in others.items()
+    }
+
+
+def _effect(row: Mapping[str, Any], style: Style, people: int) -> str:
+    return f"{verdict(row, style)}{_confounded(row)}, {f_test(row, style, people)}"
 
 
 def _trend(row: Mapping[str, Any], style: Style, results: Results) -> str:
