@@ -1,6 +1,9 @@
 """Reported statistics: whether F, degrees of freedom, p and eta squared can belong together."""
 
+import re
 from dataclasses import dataclass
+
+import numpy as np
 
 
 @dataclass(frozen=True, slots=True)
@@ -10,7 +13,8 @@ class Reported:
     Attributes
     ----------
     f, df1, df2, p
-        ``"2.43"``, ``"5.27"``, ``"184.33"``, ``".034"``.
+        ``"2.43"``, ``"5.27"``, ``"184.33"``, ``".034"`` or ``"< .001"``. Whole degrees of freedom
+        are exact, others are rounded.
     eta2p
         Partial eta squared as printed, or "".
     """
@@ -53,21 +57,29 @@ class Consistency:
 
 
 def check_reported(test: Reported) -> Consistency:
-    """Recompute p and partial eta squared of a printed F test, rounding allowed for."""
+    """Recompute p and partial eta squared of a printed F test, rounding allowed for.
+
+    Raises
+    ------
+    ValueError
+        A text is not a number; p may also be given as ``< .001``, ``> .05`` or ``p = .034``.
+    """
     from scipy.stats import f as distribution
 
-    (f_low, f, f_high), (df1_low, a, df1_high), (df2_low, b, df2_high) = map(
-        _printed, (test.f, test.df1, test.df2)
-    )
-    corners = [(x, y) for x in (df1_low, df1_high) for y in (df2_low, df2_high)]
-    p_low = min(float(distribution.sf(f_high, x, y)) for x, y in corners)
-    p_high = max(float(distribution.sf(f_low, x, y)) for x, y in corners)
-    eta_low, eta_high = _eta2p(f_low, df1_low, df2_high), _eta2p(f_high, df1_high, df2_low)
+    sign, printed = _compared(test.p)
+    (f_low, f, f_high), df1, df2 = _printed(test.f), _free(test.df1), _free(test.df2)
+    # p falls with F; over degrees of freedom it may be largest inside their range.
+    grid = np.meshgrid(np.linspace(*df1, STEPS), np.linspace(*df2, STEPS))
+    p_low = float(distribution.sf(f_high, *grid).min())
+    p_high = float(distribution.sf(f_low, *grid).max())
+    eta_low, eta_high = _eta2p(f_low, df1[0], df2[1]), _eta2p(f_high, df1[1], df2[0])
+    exact = {"<": p_low < float(printed), ">": p_high > float(printed)}
+    a, b = float(test.df1), float(test.df2)
     return Consistency(
         p=float(distribution.sf(f, a, b)),
         p_low=p_low,
         p_high=p_high,
-        p_consistent=_overlap(test.p, p_low, p_high),
+        p_consistent=exact[sign] if sign in exact else _overlap(printed, p_low, p_high),
         eta2p=_eta2p(f, a, b),
         eta2p_low=eta_low,
         eta2p_high=eta_high,
@@ -75,11 +87,32 @@ def check_reported(test: Reported) -> Consistency:
     )
 
 
+STEPS = 9
+"""Steps over the range of a rounded degree of freedom."""
+
+SLACK = 1e-9
+"""Of the ends of a range: decimal fractions are no binary ones."""
+
+
+def _compared(text: str) -> tuple[str, str]:
+    """Return the sign and the number of ``.034``, ``= .034``, ``< .001`` or ``p > .05``."""
+    found = re.fullmatch(r"\s*p?\s*([<>=]?)\s*(\d*\.?\d+)\s*", text)
+    if found is None:
+        raise ValueError(f"p is {text!r}; give '.034', '= .034', '< .001' or '> .05'")
+    return found[1], found[2]
+
+
+def _free(text: str) -> tuple[float, float]:
+    """Return the range of printed degrees of freedom; whole ones are exact."""
+    low, value, high = _printed(text)
+    return (low, high) if "." in text else (value, value)
+
+
 def _printed(text: str) -> tuple[float, float, float]:
     """Return the smallest, the printed and the largest value that is printed so."""
     digits = len(text.partition(".")[2])
     half = 0.5 * 10.0**-digits
-    return float(text) - half, float(text), float(text) + half
+    return max(0.0, float(text) - half), float(text), float(text) + half
 
 
 def _eta2p(f: float, df1: float, df2: float) -> float:
@@ -88,4 +121,4 @@ def _eta2p(f: float, df1: float, df2: float) -> float:
 
 def _overlap(text: str, low: float, high: float) -> bool:
     smallest, _, largest = _printed(text)
-    return smallest <= high and low <= largest
+    return smallest <= high + SLACK and low - SLACK <= largest
