@@ -4,6 +4,7 @@ import os
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 from labcrane.approval import codebook
 from labcrane.approval.difference import differences
@@ -12,6 +13,8 @@ from labcrane.approval.lock import FORMAT, VERSION, Lock, lock_path, read_lock
 from labcrane.approval.materials import materials
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import SHARED_FILE, copy
+from labcrane.files.units import unit_of
+from labcrane.protocol.referenced_files import plain_settings
 from labcrane.protocol.study import Study
 from labcrane.registry.registry import Registry
 
@@ -163,10 +166,29 @@ def _lock(
             "materials": materials(study, registry, consent),
             "environment": environment(),
             "machine_title": study.machine.title,
+            "settings": {
+                part: _settings(study, part)
+                for part in study.choices
+                if part.startswith(("tasks.", "feedback."))
+            },
             "codebook": codebook.rows(codebook.codebook(study)),
             "history": history,
         },
     )
+
+
+def _settings(study: Study, part: str) -> dict[str, dict[str, Any]]:
+    """Return the settings of a part in effect, with units, and whether the protocol has them."""
+    settings = study.choices[part].settings
+    marks = {name: field.metadata for name, field in type(settings).model_fields.items()}
+    return {
+        name: {
+            "value": value,
+            "unit": unit_of(name, marks.get(name, [])) or "",
+            "written": name in settings.model_fields_set,
+        }
+        for name, value in plain_settings(settings, study.path.parent).items()
+    }
 
 
 def _consent(study: Study, consent: Path) -> Path:

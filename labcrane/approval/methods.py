@@ -21,7 +21,8 @@ def methods(lock: Lock) -> str:
         f"scheme {_use(protocol['scheme'])}",
         f"The simulation ran at {_number(protocol.get('rate_hz', 240))} Hz, and every tick was "
         "recorded",
-        *_tasks(protocol, _units(lock)),
+        *_parts(protocol, lock.content.get("settings", {})),
+        *_primary(protocol),
         *_design(protocol),
         *_sessions(protocol),
         f"The software was labcrane {materials['labcrane']['version']} with the plug-ins "
@@ -44,31 +45,48 @@ def _people(protocol: Mapping[str, Any]) -> list[str]:
     planned = protocol.get("participants", {}).get("planned", 1)
     said = [f"It was planned with {planned} participant{'s' * (planned != 1)}, under pseudonyms"]
     if groups := protocol.get("design", {}).get("groups"):
+        listed = "; ".join(f"{name} {_given(list(given))}" for name, given in groups.items())
         said.append(
-            f"They were allocated to {len(groups)} groups ({', '.join(groups)}) in permuted "
-            f"blocks of {len(groups)}"
+            f"They were allocated to {len(groups)} groups ({listed}) in permuted blocks of "
+            f"{len(groups)}"
         )
     return said
 
 
-def _tasks(protocol: Mapping[str, Any], units: Mapping[str, str]) -> list[str]:
+def _parts(protocol: Mapping[str, Any], settings: Mapping[str, Any]) -> list[str]:
+    """Return the tasks and feedback with what the protocol says of each, and tasks' other settings.
+
+    Rules of onset and end are among them. An early lock has neither units nor the others.
+    """
     said = []
-    for name, task in protocol["tasks"].items():
-        words = name.replace("_", " ")
-        kind = "" if words == _use(task) else f" ({_use(task)})"
-        given = f"these settings: {_listed(task, units)}" if len(task) > 1 else "default settings"
-        said.append(f"The task {words}{kind} had {given}")
+    for kind, plural in (("task", "tasks"), ("feedback", "feedback")):
+        for name, given in protocol.get(plural, {}).items():
+            of_it = settings.get(f"{plural}.{name}", {})
+            units = {key: each["unit"] for key, each in of_it.items()}
+            words = f"these settings: {_listed(given, units)}" if len(given) > 1 else ""
+            said.append(f"The {kind} {_named(name, given)} had {words or 'default settings'}")
+            others = {
+                key: each["value"]
+                for key, each in of_it.items()
+                if not each["written"] and each["value"] not in (None, "", [], {})
+            }
+            if kind == "task" and others:
+                said[-1] += f"; by default: {_listed(others, units)}"
     return said
 
 
-def _units(lock: Lock) -> dict[str, str]:
-    """Return the units of the columns of trials, which tasks call as the settings that they vary.
+def _primary(protocol: Mapping[str, Any]) -> list[str]:
+    names = [name.replace("_", " ") for name in protocol.get("design", {}).get("primary", [])]
+    return (
+        [f"The primary outcome{'s were' * (len(names) > 1) or ' was'} {_and(names)}"]
+        if names
+        else []
+    )
 
-    A setting of several, such as ``distances``, has the unit of the column ``distance``.
-    """
-    rows = [row for row in lock.content["codebook"] if row["table"] == "trials"]
-    named = {row["name"]: row["unit"] for row in rows if row["unit"] not in {"", "1"}}
-    return {**{f"{name}s": unit for name, unit in named.items()}, **named}
+
+def _named(name: str, task: Mapping[str, Any]) -> str:
+    words = name.replace("_", " ")
+    return words if words == _use(task) else f"{words} ({_use(task)})"
 
 
 UNITS = {"s": "s", "hz": "Hz", "m": "m", "deg": "degrees"}
@@ -119,11 +137,13 @@ def _sessions(protocol: Mapping[str, Any]) -> list[str]:
         words = f"Session {number} ({session['name']})"
         if days := session.get("after_days"):
             words += f", {days[0]} to {days[1]} days after the one before,"
-        said.append(f"{words} consisted of {_and(map(_step, session['steps']))}")
+        steps = [_step(step, feedback=bool(protocol.get("feedback"))) for step in session["steps"]]
+        said.append(f"{words} consisted of {_and(steps)}")
     return said
 
 
-def _step(step: str | Mapping[str, Any]) -> str:
+def _step(step: str | Mapping[str, Any], *, feedback: bool) -> str:
+    """Return a step; one of trials with its feedback, in a study that has any."""
     if isinstance(step, str):
         return step
     ((kind, value),) = step.items()
@@ -134,10 +154,15 @@ def _step(step: str | Mapping[str, Any]) -> str:
         return f"{kind} ({_value(value)})"
     if kind == "break":
         return f"a break of {_with_unit(value['seconds'], 's')}"
-    name = value.get("name") or value.get("task")
+    name, task = value.get("name"), value.get("task")
+    name = f"{name} ({task})" if name and task and name != task else name or task
     times = value.get("repeat", 1)
     if place := value.get("condition"):
         name = f"{name} (the participant's condition {place})"
+    elif feedback and task:
+        name = f"{name} {_given(value.get('feedback', 'all'))}"
+        if shares := value.get("fading"):
+            name = f"{name} in shares of {_value(shares)} of the trials of successive parts"
     label = f"the {kind} {name}" if name else f"{kind} ({_listed(value)})"
     return f"{times} times {label}" if times > 1 else label
 
@@ -183,6 +208,8 @@ def _value(value: Any) -> str:
         return ", ".join(
             f"{str(name).replace('_', ' ')} {_value(of)}" for name, of in value.items()
         )
+    if isinstance(value, str) and value.isidentifier():
+        return value.replace("_", " ")
     return _number(value) if isinstance(value, float) else str(value)
 
 

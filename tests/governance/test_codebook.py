@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path
@@ -73,13 +74,19 @@ def test_the_methods_paragraph_says_what_was_approved_and_done(tmp_path: Path) -
     said = methods(lock)
     for words in (
         "“A short study” was approved by Ethics board (reference KB-12/2026, valid until",
-        "3 groups (none, visual, sound) in permuted blocks of 3. ",  # of slots the register knows
+        "3 groups (none without feedback; visual with the feedback sphere; sound with the feedback "
+        "tone) in permuted blocks of 3. ",  # of slots the register knows
         "CH8 knuckle boom",
         "at 240 Hz",
-        "The task aiming had these settings: distances 2 and 3 m; movements 1; limit 20 s. ",
+        "The task aiming had these settings: distances 2 and 3 m; movements 1; limit 20 s; by "
+        "default: width 0.5 m; ",
+        "; end rest inside; ",
+        "; rest speed 0.02 m/s; rest 0.2 s; ",
+        "; onset speed 0.02 m/s; onset hold 0.1 s. ",
+        "The feedback tone (sonification) had default settings. ",
         "The levels of pairs came in randomised blocks, 3 times each, no more than 1 in a row",
         "Session 1 (only), 0 to 3 days after the one before, consisted of consent and the block "
-        "aiming. ",
+        "aiming with all feedback. ",
         f"labcrane {labcrane.__version__}",
         lock.materials_sha256,
     ):
@@ -105,6 +112,39 @@ def test_the_steps_of_a_session_are_words_with_units_in_the_methods(tmp_path: Pa
         "consisted of the questionnaires effort and ease, a break of 120 s, the questionnaire "
         "effort and the block aiming. "
     ) in said
+
+
+TRAINED = GROUPED.replace("design:", "design:\n  primary: [movement_time, absolute_error]").replace(
+    "  - name: only",
+    "  - name: before\n    steps:\n"
+    "      - block: {task: aiming, feedback: none, name: pre-test}\n"
+    "      - block: {task: aiming, feedback: group, name: training}\n"
+    "      - block: {task: aiming, feedback: [tone], name: tones}\n  - name: only",
+)
+
+
+def test_the_methods_name_the_feedback_that_each_group_has_in_each_block(tmp_path: Path) -> None:
+    lab = Lab(tmp_path, TRAINED)
+    said = methods(lab.approve())
+    assert "The primary outcomes were movement time and absolute error. " in said
+    groups = dict(re.findall(r"(\w+) (without feedback|with the feedback \w+)[;)]", said))
+    assert list(groups) == ["none", "visual", "sound"]
+    names = {"without feedback": set(), "with all feedback": {"sphere", "tone"}}
+    for session, blocks in enumerate((("pre-test", "training", "tones"), ("aiming",)), start=1):
+        for slot in (1, 2, 3):
+            plan = plan_session(lab.study, "P001", session, slot)
+            assert len(plan.blocks) == len(blocks)
+            for name, block in zip(blocks, plan.blocks, strict=True):
+                label = name if name == "aiming" else f"{name} (aiming)"
+                (given,) = re.findall(
+                    rf"the block {re.escape(label)} (with(?:out| all| the) feedback[\w ]*?)"
+                    r"(?=,|\.| and the block)",
+                    said,
+                )
+                if given == "with the feedback of the group":
+                    given = groups[plan.group]
+                meant = names.get(given, {given.rpartition(" ")[2]})
+                assert {frozenset(on) for on in block.feedback.values()} == {frozenset(meant)}
 
 
 def test_methods_writes_the_codebook_beside_the_protocol(
