@@ -300,9 +300,13 @@ def test_f_p_and_partial_eta_squared_in_words_are_those_of_r(
             assert f"{verb} over {factor}, {f}{ratio}, {p} {chance}, {eta} {share}" in said
         word, slope, low, high, value, chance = words_in_r[f"{measure} trend"]
         unit = "m" if measure == "absolute_error" else "s"
+        trends = told(folder, "trends").set_index("measure")
+        number = f"{word} by {slope}"
+        if trends.loc[measure, "p_holm"] >= 0.05:
+            number = f"did not detectably change: {minus * (word == 'fell')}{slope}"
         low, high, value = (each.replace("-", minus) for each in (low, high, value))
         assert (
-            f"it {word} by {slope} {unit} each, 95 {percent} CI [{low}, {high}], "
+            f"it {number} {unit} each, 95 {percent} CI [{low}, {high}], "
             f"{t}{value}, {p} {chance.replace('<', less)}"
         ) in said
 

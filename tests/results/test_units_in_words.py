@@ -52,7 +52,9 @@ def in_words(measure: str, scale: float) -> str:
 def test_steps_and_differences_of_an_outcome_have_its_unit(measure: str, scale: float) -> None:
     said = in_words(measure, scale)
     unit = re.escape(UNITS[measure])
-    assert re.search(rf"it fell by [0-9.]+ {unit} each, 95 % CI", said), said
+    assert re.search(
+        rf"it (?:fell by|did not detectably change:) .?[0-9.]+ {unit} each, 95 % CI", said
+    ), said
     assert re.search(rf"4 m: .?[0-9.]+ {unit}, 95 % CI", said), said
     assert "  " not in said
 
@@ -60,6 +62,72 @@ def test_steps_and_differences_of_an_outcome_have_its_unit(measure: str, scale: 
 @pytest.mark.parametrize("measure", ["sparc", "path_ratio"])
 def test_an_outcome_without_a_unit_has_no_gap_where_it_would_be(measure: str) -> None:
     said = in_words(measure, -1.0 if measure == "sparc" else 1.0)
-    assert re.search(r"it (fell|rose) by [0-9.]+ each, 95 % CI", said), said
+    assert re.search(
+        r"it (fell by|rose by|did not detectably change:) .?[0-9.]+ each, 95 % CI", said
+    ), said
     assert "  " not in said
     assert " 1 each" not in said
+
+
+@pytest.mark.parametrize(
+    ("slope", "p", "corrected", "said"),
+    [
+        (-0.12, 0.001, 0.004, "it fell by 0.12 s each"),
+        (0.12, 0.001, float("nan"), "it rose by 0.12 s each"),
+        (0.12, 0.04, 0.16, "it did not detectably change: 0.12 s each"),
+        (-0.12, 0.992, float("nan"), "it did not detectably change: \N{MINUS SIGN}0.12 s each"),
+        (-1.25e-16, 1.0, 1.0, "it did not detectably change: 0 s each"),
+    ],
+)
+def test_a_trend_rose_or_fell_only_where_its_corrected_p_says_so(
+    slope: float, p: float, corrected: float, said: str
+) -> None:
+    row = {
+        "measure": "movement_time",
+        "block": "1 b",
+        "slope": slope,
+        "slope_low": slope - 0.1,
+        "slope_high": slope + 0.1,
+        "t": 1.0,
+        "df": 9.0,
+        "p": p,
+        "p_holm": corrected,
+        "n": 10,
+    }
+    none = pd.DataFrame()
+    counts = pd.DataFrame({"trials": [1], "time_outs": [0], "others": [0]})
+    tests = pd.DataFrame(
+        [
+            {
+                "measure": "movement_time",
+                "factor": "x",
+                "f": 1.0,
+                "df1": 1.0,
+                "df2": 9.0,
+                "epsilon": 1.0,
+                "p_gg": 0.3,
+                "eta2p": 0.1,
+                "n": 10,
+            }
+        ]
+    )
+    factors = factors_of(
+        with_factors(
+            pd.DataFrame({"participant": ["P001"], "sequence": [1.0], "movement_time": [1.0]})
+        )
+    )
+    found = Results(
+        SAMPLE,
+        tests,
+        none,
+        pd.DataFrame([row]),
+        none,
+        none,
+        none,
+        counts,
+        factors,
+        10,
+        none,
+        units={"movement_time": "s"},
+    )
+    assert said in paragraphs(found, STYLES["html"])[1]

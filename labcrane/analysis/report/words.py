@@ -32,6 +32,9 @@ LOOKED = {
 }
 SMALLEST = 0.001
 
+ROUNDING = 1e-9
+"""Share of an interval; a smaller estimate is what rounding leaves of zero."""
+
 UNBALANCED = (
     "Sessions do not have the same blocks: each block of each session is a level of one factor, "
     "phase, and effects of session and block cannot be separated"
@@ -276,16 +279,26 @@ def _effect(row: Mapping[str, Any], style: Style, people: int) -> str:
     return f"{verdict(row, style)}{_confounded(row)}, {f_test(row, style, people)}"
 
 
+def changed(estimate: float, p: float) -> str:
+    """Return ``fell by`` or ``rose by`` of a change that was found, by its corrected p."""
+    if not p < LEVEL:
+        return "did not detectably change:"
+    return "fell by" if estimate < 0 else "rose by"
+
+
 def _trend(row: Mapping[str, Any], style: Style, results: Results) -> str:
     phase = next((str(row[kind]) for kind in ("session", "block", "phase") if kind in row), "")
-    word = "fell" if row["slope"] < 0 else "rose"
-    holm = "" if math.isnan(row["p_holm"]) else f" (after Holm {_p(row['p_holm'], style)})"
+    corrected = not math.isnan(row["p_holm"])
+    holm = f" (after Holm {_p(row['p_holm'], style)})" if corrected else ""
+    said = changed(row["slope"], row["p_holm"] if corrected else row["p"])
     low, high = _number(row["slope_low"], style), _number(row["slope_high"], style)
-    step = results.quantity(f"{abs(row['slope']):.3g}", row["measure"])
+    widest = max(abs(row["slope_low"]), abs(row["slope_high"]))
+    slope = 0.0 if abs(row["slope"]) < ROUNDING * widest else row["slope"]
+    number = _number(slope, style) if said.endswith(":") else f"{abs(slope):.3g}"
     return (
-        f"Over the positions of {style.plain(phase)}{_confounded(row)} it {word} by "
-        f"{step} each, 95 {style.percent} CI [{low}, {high}], {_t(row, style)}{holm}"
-        f"{of_people(row, style, results.people)}."
+        f"Over the positions of {style.plain(phase)}{_confounded(row)} it {said} "
+        f"{results.quantity(number, row['measure'])} each, 95 {style.percent} CI [{low}, {high}], "
+        f"{_t(row, style)}{holm}{of_people(row, style, results.people)}."
     )
 
 
