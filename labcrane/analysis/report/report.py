@@ -524,6 +524,8 @@ def _of_model(model: MixedModel) -> Iterator[str]:
     )
     if model.measure in TIMES and not model.log:
         yield "It is modelled untransformed, since a value of 0 or less has no logarithm."
+    if model.alone:
+        yield f"Without {', '.join(model.alone)}, alone in a group or in none."
     if model.zero:
         yield f"Without random terms whose variance is estimated as zero: {', '.join(model.zero)}."
     if model.inseparable:

@@ -21,7 +21,7 @@ from labcrane.analysis.report.outcomes import (
     practice_words,
     practised,
 )
-from labcrane.analysis.statistics.anova import LEAST, whole_people, word
+from labcrane.analysis.statistics.anova import LEAST, alone, whole_people, word
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -214,6 +214,8 @@ class _Design:
         self._done, self._recorded = table, recorded
         self._unseen = recorded[is_success(recorded) & not_presented(recorded)]
         self.whole, self._empty = whole_people(table, measure, within)
+        grouped = {who: people.get(who, "") for who in self.whole} if GROUP in levels else {}
+        self._alone = alone(grouped)
         self._there = {
             name: [level for level in levels[name] if (self._known[name] == level).any()]
             for name in within
@@ -249,8 +251,11 @@ class _Design:
         varied = {factor: own for factor, own in self._there.items() if len(own) > 1}
         cells = set(product(*varied.values()))
         why: dict[str, list[str]] = {}
-        for who in self.people:
-            if who not in self.whole:
+        for who, group in self.people.items():
+            if who in self._alone:
+                said = f"alone in group {group}" if group else "in no group"
+                why.setdefault(said, []).append(who)
+            elif who not in self.whole:
                 lacks = cells - _cells_of(self._known, who, list(varied))
                 recorded = _cells_of(self._recorded, who, list(varied))
                 done = _cells_of(self._done, who, list(varied))
@@ -261,12 +266,12 @@ class _Design:
                     "no success that was shown": lacks & unseen,
                     "no value": lacks & done,
                 }
-                said = [
+                kinds = [
                     kind + self._where(own, cells, list(varied))
                     for kind, own in of_kind.items()
                     if own
                 ]
-                why.setdefault(" and ".join(said), []).append(who)
+                why.setdefault(" and ".join(kinds), []).append(who)
         yield from left_out(self.measure, name, why, len(self.people))
 
     def _where(
@@ -296,21 +301,19 @@ class _Design:
         return [] if there is None else [one for one in self.levels[factor] if one not in there]
 
     def _why(self, effect: tuple[str, ...]) -> str:
-        whole, groups = len(self.whole), {self.people.get(who, "") for who in self.whole}
+        kept = [who for who in self.whole if who not in self._alone]
+        whole, groups = len(kept), {self.people.get(who, "") for who in kept}
         for factor in effect:
             if len(self._there.get(factor, "ab")) < 2:  # noqa: PLR2004 - two can be compared
                 gone = ", ".join(map(word, self._gone(factor)))
                 return f"no participant has a value at {self._word(factor)} {gone}"
         if whole < LEAST:
-            have = f"{whole} of {len(self.people)} people have a value{self._cells}"
+            have = f"{len(self.whole)} of {len(self.people)} people have a value{self._cells}"
+            if len(self.whole) >= LEAST:
+                have += f", {len(self._alone)} of them alone in a group or in none"
             return f"{have}, and {LEAST} are needed{self._nobody()}"
         if len(groups) < 2 and GROUP in effect:  # noqa: PLR2004
             return f"all {whole} people with a value{self._cells} are in group {groups.pop()}"
-        if GROUP in self.levels and whole <= len(groups):
-            return (
-                f"{whole} people with a value{self._cells} are in {len(groups)} groups, "
-                "too few to estimate the variance between people"
-            )
         return f"the {whole} people with a value{self._cells} do not differ in the tested values"
 
     def _nobody(self) -> str:

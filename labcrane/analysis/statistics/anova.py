@@ -1,6 +1,7 @@
 """Analysis of variance of designs within, between and of both, and contrasts of their means."""
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, product
 from typing import TYPE_CHECKING, Any
@@ -163,14 +164,17 @@ def design(
     """Return the cells of a design; None where fewer than three whole participants are left.
 
     A participant's value in a cell is the mean over their rows there. A factor of one level is
-    ignored.
+    ignored. Who is alone in a group is left out.
     """
     known = table.dropna(subset=[measure])
     levels = _levels(known, within)
     wide = _cells(known, known[measure], levels)
     whole = wide.dropna()
-    left_out = tuple(map(str, wide.index.difference(whole.index)))
     who = known.groupby("participant")[list(between)].first().loc[whole.index]
+    if between:
+        own = dict(zip(who.index, who.itertuples(index=False), strict=True))
+        whole, who = (each.drop(index=list(alone(own))) for each in (whole, who))
+    left_out = tuple(map(str, wide.index.difference(whole.index)))
     groups = {name: tuple(sorted(who[name].unique())) for name in between}
     groups = {name: own for name, own in groups.items() if len(own) > 1}
     model, terms = _model(who, groups)
@@ -182,6 +186,18 @@ def design(
     rank = int(np.linalg.matrix_rank(model)) if len(whole) else 0
     whole_enough = len(whole) >= LEAST and found.free >= 1 and rank == model.shape[1]
     return found if whole_enough else None
+
+
+def alone(groups: Mapping[Any, Any]) -> set[Any]:
+    """Return who is in no group, or is the only one of theirs: a group of one has no variance.
+
+    Parameters
+    ----------
+    groups
+        The group of each participant, or their levels of several factors; "" is none.
+    """
+    counts = Counter(groups.values())
+    return {who for who, own in groups.items() if counts[own] == 1 or "" in (own, *own)}
 
 
 def whole_people(

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from labcrane.analysis.statistics.anova import alone
 from labcrane.analysis.statistics.confounding import dummies
 from labcrane.analysis.statistics.rounding import alike
 from labcrane.types import FloatArray
@@ -108,6 +109,8 @@ class MixedModel:
         Movements and participants.
     missing
         Movements without a value, which are left out.
+    alone
+        Participants who are left out since they are alone in a group, or in none beside others.
     reference
         The first group, where there are several; otherwise empty.
     """
@@ -125,6 +128,7 @@ class MixedModel:
     n: int
     participants: int
     missing: int
+    alone: tuple[str, ...]
     reference: str = ""
 
 
@@ -140,6 +144,7 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel:
     import pandas as pd
     from scipy.stats import t as distribution
 
+    movements, gone = _in_company(movements, measure)
     data, log = _modelled(movements, measure)
     people = data["participant"].nunique()
     if people < LEAST:
@@ -200,6 +205,7 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel:
         n=len(data),
         participants=people,
         missing=len(movements) - len(data),
+        alone=gone,
         reference=str(groups[0]) if len(groups) > 1 else "",
     )
 
@@ -207,6 +213,15 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel:
 def _plain(term: str) -> str:
     """Return ``group:phase`` of ``group[T.visual]:phase[T.second]``."""
     return re.sub(r"\[T\.[^\]]*\]", "", term)
+
+
+def _in_company(movements: "pd.DataFrame", measure: str) -> tuple["pd.DataFrame", tuple[str, ...]]:
+    """Return the movements without those of people who are alone in a group, and who they are."""
+    if "group" not in movements:
+        return movements, ()
+    groups = movements.dropna(subset=[measure]).groupby("participant")["group"].first()
+    gone = alone(dict(groups)) if groups.nunique() > 1 else set()
+    return movements[~movements["participant"].isin(gone)], tuple(sorted(map(str, gone)))
 
 
 def _modelled(movements: "pd.DataFrame", measure: str) -> tuple["pd.DataFrame", bool]:
