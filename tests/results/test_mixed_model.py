@@ -224,6 +224,16 @@ def test_conditions_of_blocks_in_one_order_are_said_to_be_one_with_the_blocks() 
     assert confounded[confounded != ""].to_dict() == {"phase[T.2]": "condition[T.v]"}
 
 
+def test_people_differ_by_session_and_block_only_where_each_session_has_the_same_blocks() -> None:
+    crossed = drawn(2, groups=("",), sessions=2)
+    named = {"(1 | participant:session)", "(1 | participant:block)", "(1 | participant:phase)"}
+    model = mixed_model(crossed, "y")
+    assert named <= {*model.random, *model.zero}
+    model = mixed_model(crossed[crossed["phase"] != "4"], "y")
+    assert named & {*model.random, *model.zero} == {"(1 | participant:phase)"}
+    assert model.inseparable == ()
+
+
 def test_blocks_without_a_condition_are_no_reference_of_conditions() -> None:
     crossed = drawn(5, groups=("",), conditions="uv", blocks=2)
     before = crossed[crossed["phase"] == "1"].assign(phase="0", condition=np.nan)

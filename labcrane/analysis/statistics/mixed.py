@@ -74,7 +74,8 @@ class MixedModel:
     Fixed are ``sequence + difficulty + far_side``, the two numbers centred; with groups also
     ``group * sequence``, with sessions or blocks ``phase``, within participants ``condition``, each
     by group. Random are the participant, and participant by each of these that varies within
-    people, and by session and block where both do: independent, each with one variance.
+    people, and by session and block where each session has the same blocks. They are independent,
+    each with one variance.
 
     A random term is in the model if it adds to those before it within people and leaves movements
     for the residual; one whose variance is estimated as zero is then left out, which changes no
@@ -294,10 +295,12 @@ def _independent(columns: FloatArray) -> tuple[list[int], dict[int, list[int]]]:
 def _of_people(data: "pd.DataFrame") -> dict[str, FloatArray]:
     """Return the columns of one participant for each random term that the data vary in."""
     found = {"(1 | participant)": np.ones((len(data), 1))}
-    of_phases = {"of_session", "of_block"}
-    several = of_phases <= {name for name in data if data[name].nunique() > 1}
+    of_phases = [name for name in ("of_session", "of_block") if name in data]
+    levels = [data[name].nunique() for name in of_phases]
+    # Sessions of unlike blocks are one factor, phase.
+    crossed = min(levels, default=0) > 1 and len(data.groupby(of_phases)) == np.prod(levels)
     for name, of in RANDOM.items():
-        if name not in data or (name in of_phases and not several):
+        if name not in data or (name in of_phases and not crossed):
             continue
         if _is_number(data[name]):
             found[f"(0 + {name} | {of})"] = data[[name]].to_numpy(float)
