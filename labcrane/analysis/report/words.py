@@ -252,12 +252,12 @@ def f_test(row: Mapping[str, Any], style: Style, people: int) -> str:
 
 
 def verdict(row: Mapping[str, Any], style: Style) -> str:
-    """Return ``differed over distance``, or ``there was an interaction of group and block``."""
+    """Return ``differed over distance``, or ``showed an interaction of group and block``."""
     effect, _, rest = str(row["factor"]).partition(" ")
     names = style.plain(" and ".join(effect.split(":")) + (f" {rest}" if rest else ""))
     if ":" in effect:
-        said = "there was an interaction" if row["p_gg"] < LEVEL else "no interaction was found"
-        return f"{said} of {names}"
+        said = "showed an" if row["p_gg"] < LEVEL else "showed no detectable"
+        return f"{said} interaction of {names}"
     return f"{'differed' if row['p_gg'] < LEVEL else 'did not detectably differ'} over {names}"
 
 
