@@ -342,14 +342,20 @@ def foreign_nearby(random, *, side):
 
 
 def foreign_drifting(random):
-    """Stamps of a clock that drifts away from the probed one."""
+    """Stamps of a clock that drifts away from the probed one.
+
+    One that falls behind looks like a way that gets slower, one that runs ahead of markers like
+    stamps of what is to come: probes that agree outweigh arrivals, and the uncertainty holds both.
+    """
     times, rate = announced(random)
     ppm = random.choice([-1, 1]) * random.uniform(40.0, 200.0)
-    drawn = received(
-        random, Clock(random), times, rate, faults=frozenset({Fault.FOREIGN}), clean=False
-    )
+    drawn = received(random, Clock(random), times, rate, clean=False)
     stamps = drawn.raw.stamps + 1e-6 * ppm * (times - times[0])
-    return replace(drawn, raw=RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals))
+    foreign = frozenset({Fault.FOREIGN})
+    fault = foreign if rate and ppm > 0.0 else frozenset()
+    either = frozenset() if rate or ppm < 0.0 else foreign | {Fault.AHEAD}
+    raw = RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals)
+    return replace(drawn, raw=raw, faults=fault, perhaps=either)
 
 
 def frozen(random):

@@ -10,7 +10,6 @@ from labcrane.streams.sync.epochs import Epoch
 from labcrane.streams.sync.offset import SURE, OffsetCurve, fit
 from labcrane.streams.sync.quality import Basis, ClockSegment
 from labcrane.streams.sync.raw import REMOTE, RawStream
-from labcrane.streams.sync.sampling import coarse_unit
 from labcrane.streams.sync.smoother import smooth
 from labcrane.streams.sync.steady_sampler import SteadySampler
 from labcrane.types import FloatArray
@@ -55,7 +54,6 @@ BLOCK_S = 10.0
 LAG_BLOCK_S, LAG_BLOCK = 30.0, 40
 """So long, and of so many samples of irregular streams, lags are looked at together."""
 
-DRIFTED_S = 0.002
 FROZEN_SHARE = 0.2
 """Where more samples repeat a stamp, chunks have one each."""
 
@@ -118,8 +116,7 @@ def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placement
     known = raw, arrival, stretches
     time, error, segments = _placed(known, curves, least, whose, regular=regular)
     if arrival is not None and np.isfinite(least) and not whose:
-        unit = coarse_unit(raw.stamps, regular=regular)
-        lags = _lags(time, error, arrival, unit, regular=regular)
+        lags = _lags(time, error, arrival, regular=regular)
         if lags is None:
             whose = "foreign"
             time, error, segments = _placed(known, curves, least, whose, regular=regular)
@@ -141,7 +138,7 @@ def _ahead(lag: FloatArray, error: FloatArray) -> float:
     """
     if not _came_early(lag, error):
         return 0.0
-    return float(-lag.min()) + SHORT_LAG_S + 2.0 * PULL_S / len(lag)
+    return float(-lag.min()) + SHORT_LAG_S + PULL_S * max(2.0 / len(lag), 0.1)
 
 
 def _came_early(lag: FloatArray, error: FloatArray) -> bool:
@@ -272,13 +269,13 @@ def _stamped_by(
 
 
 def _lags(
-    time: FloatArray, error: FloatArray, arrival: FloatArray, unit: float, *, regular: bool
+    time: FloatArray, error: FloatArray, arrival: FloatArray, *, regular: bool
 ) -> FloatArray | None:
     """Return by how much arrivals allow the stamps to be off, shape ``(n,)``, in seconds.
 
     A stamp may be too early by as long as its samples took at least, be it on their way or by a
-    clock that is behind. None where they came before they were taken, or ever later: then the
-    stamps are of another clock than that which was probed. ``unit`` is what they may be cut to.
+    clock that is behind, whether that stays or grows. None where they came before they were taken:
+    then the stamps are of another clock than that which was probed.
     """
     starts = np.r_[0, np.flatnonzero(np.diff(arrival)) + 1]
     parts = _parts((arrival[starts] - arrival[0]) / LAG_BLOCK_S if regular else starts / LAG_BLOCK)
@@ -286,13 +283,10 @@ def _lags(
     if found is None:
         return None
     high, low, shown = found
-    middle = np.array([float(arrival[starts[part]].mean()) for part in parts])
-    if _drifts(middle, high, low, (_scatter(time) if regular else 0.0) + unit):
-        return None
     usual = (high <= USUAL_LAG_S) | (low <= USUAL_LAG_S) & regular
     late = np.where(usual, np.minimum(np.maximum(high, SHORT_LAG_S), shown), high)
     late = np.maximum(late, SHORT_LAG_S - high)
-    around = np.pad(late, 1, mode="edge")
+    around = np.pad(late, 1, mode="reflect", reflect_type="odd")  # a lag that grows goes on
     late = np.maximum(late, np.maximum(around[:-2], around[2:]))
     counts = np.diff([*(int(starts[part[0]]) for part in parts), len(time)])
     return np.asarray(np.nan_to_num(np.repeat(late, counts), posinf=0.0))
@@ -348,9 +342,6 @@ def _uneven_lags(
     least = np.minimum.reduceat(lag, starts)
     high = np.array([_quantile(least[part], 0.0) for part in parts])
     low = high - PULL_S / 10.0
-    middle = np.array([float(arrival[starts[part]].mean()) for part in parts])
-    if early and _drifts(-middle[::-1], high[::-1], low[::-1], 0.0):  # it runs ahead
-        return None
     sure = error <= 2.0 * np.nanmedian(error)  # none near a step
     high[low <= USUAL_LAG_S] = lag[sure].min(initial=np.inf)
     before = arrival[starts[:-1]] - np.minimum.reduceat(time, starts)[1:]
@@ -395,21 +386,6 @@ def _scatter(time: FloatArray) -> float:
     if not len(steps):
         return 0.0
     return float(1.4826 * np.median(np.abs(steps - np.median(steps))) / np.sqrt(2.0))
-
-
-def _drifts(middle: FloatArray, high: FloatArray, low: FloatArray, scatter: float) -> bool:
-    """Whether the least lag of blocks goes steadily up: the stamps' clock drifts away.
-
-    Stamps that scatter make the least lags seem shorter and the others longer, and lags also slide
-    with the phase of the pulls against the samples.
-    """
-    gone_at_least = DRIFTED_S + 4.0 * scatter
-    if len(middle) < 4 or not low[-1] > high[0] + gone_at_least:  # noqa: PLR2004
-        return False
-    slope, level = np.polyfit(middle - middle[0], high, 1)
-    rest = high - level - slope * (middle - middle[0])
-    gone = float(slope) * float(middle[-1] - middle[0])
-    return gone > gone_at_least and 4.0 * float(rest.std()) < gone
 
 
 def _pieces(

@@ -1,0 +1,84 @@
+"""Two faults at once, drawn from plain arithmetic: what is proven by nothing is not moved.
+
+Nothing here is taken from the code under test, nor from the emulated devices of the other tests.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from labcrane.clocks import correct
+from labcrane.streams.sync.quality import Basis
+
+PROBED = list(Basis).index(Basis.PROBES)
+
+
+@dataclass(frozen=True)
+class Remote:
+    """A clock of another computer: how far it is off ours, how fast, and by how much it steps."""
+
+    offset: float
+    ppm: float
+    step: float = 0.0
+    step_at: float = np.inf
+
+    def __call__(self, t: np.ndarray) -> np.ndarray:
+        return t * (1.0 + 1e-6 * self.ppm) + self.offset + self.step * (t >= self.step_at)
+
+    def probes(self, random: np.random.Generator, until: float) -> np.ndarray:
+        at = np.arange(0.0, until, random.uniform(1.0, 2.0))
+        trip = random.uniform(5e-5, 3e-4) * random.uniform(1.0, 1.5, len(at))
+        there = self(at)
+        offset = at - there + random.uniform(-0.1, 0.1, len(at)) * trip
+        return np.column_stack([there, offset, trip])
+
+
+def some_clock(random: np.random.Generator, **step: float) -> Remote:
+    return Remote(random.uniform(-5000.0, 5000.0), random.uniform(-80.0, 80.0), **step)
+
+
+def pulled(random: np.random.Generator, sent: np.ndarray) -> np.ndarray:
+    """Return when samples are taken over, which are sent in their order."""
+    every = random.uniform(0.01, 0.03)
+    return np.ceil(np.maximum.accumulate(sent) / every) * every
+
+
+def slower_way(random: np.random.Generator, share: np.ndarray) -> np.ndarray:
+    """Return how long samples are on a way that gets slower by some milliseconds, and jitters."""
+    shape = random.choice(["line", "once", "and back", "by and by"])
+    rise = {
+        "line": share,
+        "once": (share > random.uniform(0.2, 0.8)).astype(float),
+        "and back": np.sin(np.pi * share),
+        "by and by": 1.0 - np.exp(-3.0 * share),
+    }[str(shape)]
+    base, by = random.uniform(0.0, 0.03), random.uniform(2e-3, 8e-3)
+    return base + by * rise + random.exponential(random.uniform(1e-4, 4e-3), len(share))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_probes_that_agree_outweigh_a_way_that_gets_slower(seed: int) -> None:
+    """Right stamps were of "a clock that LSL does not know", and moved by 23 ms."""
+    random = np.random.default_rng([2, seed])
+    rate, seconds = float(random.choice([60.0, 120.0, 250.0, 500.0])), random.uniform(120.0, 300.0)
+    t = 1.0 + np.arange(int(rate * seconds)) / (rate * (1.0 + random.uniform(-5e-5, 5e-5)))
+    clock = some_clock(random)
+    if seed % 2:
+        step = random.choice([-1.0, 1.0]) * np.exp(random.uniform(np.log(0.05), np.log(5.0)))
+        clock = some_clock(random, step=step, step_at=random.uniform(0.3, 0.7) * seconds)
+    way = slower_way(random, t / t[-1])
+    corrected = correct(
+        clock(t),
+        probes=clock.probes(random, t[-1]),
+        arrivals=pulled(random, t + way),
+        rate_hz=rate,
+    )
+    off = np.abs(corrected.time - t)
+    assert corrected.quality.whose == ""
+    assert (corrected.basis == PROBED).all()
+    assert np.array_equal(corrected.time, corrected.uneven)
+    assert np.quantile(off, 0.95) < 1e-4
+    assert np.mean(off <= corrected.error) >= 0.99
+    # The soonest sample of a while shows a lag that may be a clock behind, be it long or short.
+    assert np.median(corrected.error) > np.quantile(way, 0.02) - 2e-3
