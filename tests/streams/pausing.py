@@ -62,20 +62,6 @@ def pausing(random, *, whole: bool, arrivals: bool, scatter: float | None = None
     return Paused(drawn, missing, int(big.sum()), float(steps[at].max()), scatter)
 
 
-def shrinking(random) -> Drawn:
-    """A sampler that pauses, or does not, and behind that a buffer that shrinks."""
-    rate = float(random.choice([120.0, 250.0, 500.0]))
-    count = int(random.integers(10_000, 30_000))
-    steps = np.full(count, 1.0 / rate)
-    paused = int(random.uniform(0.1, 0.4) * count)
-    steps[paused] += random.choice([0.0, random.uniform(0.05, 0.45)])
-    times = START + np.cumsum(steps)
-    shrinks = int(random.uniform(0.5, 0.9) * count)
-    late = np.where(np.arange(count) < shrinks, random.uniform(0.02, 0.045), 0.0)
-    sent = np.maximum.accumulate(times + late)
-    return received(random, Clock(random), times, rate, stamped=times + late, sent=sent)
-
-
 def stalling(random, *, arrivals: bool) -> Drawn:
     """A program that stalls, and then takes and sends what it owes, one sample after the other."""
     rate = float(random.choice([60.0, 120.0, 250.0, 1000.0]))

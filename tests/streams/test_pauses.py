@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from streams.pausing import ROWS, shrinking, stalling
+from streams.pausing import ROWS, stalling
 from streams.unkind import START, Clock, received
 
 from labcrane import clocks
@@ -80,26 +80,16 @@ def test_an_eye_lost_thirteen_times_moves_no_stamp_and_is_named(*, counted: bool
     assert corrected.quality.gaps == 13
 
 
-def test_shifts_add_up_to_no_more_than_a_buffer_holds() -> None:
+def test_shifts_to_later_add_up_to_no_more_than_a_buffer_holds() -> None:
     random = np.random.default_rng(7)
     for _ in range(100):
         count = int(random.integers(1, 60))
         at = np.sort(random.integers(1, 1000, count)).astype(np.intp)
-        shifts = Shifts(at, random.uniform(-0.2, 0.4, count))
-        late, surely = shifts.late(1000), shifts.surely(1000)
-        assert 0.0 <= late.min() <= late.max() <= MOST_S
-        assert 0.0 <= surely.min() <= surely.max() <= MOST_S
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_what_was_stamped_before_a_buffer_shrank_was_late_for_certain(seed: int) -> None:
-    """A pause before it is left as it is: what is moved is nearer to the truth by all of that."""
-    drawn = shrinking(np.random.default_rng(seed))
-    corrected = correct(drawn.raw, drawn.treatment)
-    off, uneven_off = (np.abs(t - drawn.truth) for t in (corrected.time, corrected.uneven))
-    assert (off <= uneven_off + WORSE_S).all()
-    assert off.mean() < uneven_off.mean()
-    assert np.mean(off <= corrected.error) >= 0.99
+        by = random.uniform(0.0, 0.4, count)
+        open_s = Shifts(at, by).open_s(1000)
+        assert open_s.max() == pytest.approx(min(by.sum(), MOST_S))
+        assert Shifts(at, -by).open_s(1000).max() == pytest.approx(by.sum())
+        assert open_s.min() >= 0.0
 
 
 @pytest.mark.parametrize("arrivals", [True, False])

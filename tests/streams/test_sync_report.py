@@ -66,10 +66,9 @@ def test_a_buffer_that_shrinks_is_told(seed: int) -> None:
     stream = replace(recorded(), time_raw=SourceClock()(times), arrivals=raw.arrivals)
     (found,) = (each for each in judged(stream).findings if "timestamps shifted" in each.text)
     assert found.verdict is Verdict.WARN
-    assert "or its delay changed" in found.text
+    assert "its delay changed" in found.text
     corrected = resync(stream)
-    assert np.all(np.diff(corrected.time) > 0.0)
-    assert np.diff(corrected.uneven).min() < -0.01
+    assert np.array_equal(corrected.time, corrected.uneven)
 
 
 @pytest.mark.parametrize(

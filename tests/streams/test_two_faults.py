@@ -82,3 +82,47 @@ def test_probes_that_agree_outweigh_a_way_that_gets_slower(seed: int) -> None:
     assert np.mean(off <= corrected.error) >= 0.99
     # The soonest sample of a while shows a lag that may be a clock behind, be it long or short.
     assert np.median(corrected.error) > np.quantile(way, 0.02) - 2e-3
+
+
+def set_back(random: np.random.Generator, t: np.ndarray, least: float, most: int) -> np.ndarray:
+    """Return by how much a program's wall clock was set back until then, once or more often."""
+    by = np.zeros(len(t))
+    for at in np.linspace(0.0, t[-1], int(random.integers(1, most + 1)) + 2)[1:-1]:
+        size = np.exp(random.uniform(np.log(least), np.log(0.48)))
+        by[t > at + random.uniform(-0.2, 0.2) * t[-1] / (most + 2)] += size
+    return by
+
+
+@pytest.mark.parametrize("other", ["nothing else", "lost", "scatter", "slower", "counted"])
+@pytest.mark.parametrize("seed", range(4))
+def test_stamps_that_are_set_back_move_nothing_and_state_it(seed: int, other: str) -> None:
+    """Right samples before it were moved by the step, and 0.5 ms stated for 200 behind it."""
+    random = np.random.default_rng([3, seed, *other.encode()])
+    rate, seconds = float(random.choice([60.0, 120.0, 250.0, 500.0])), random.uniform(120.0, 300.0)
+    t = 1.0 + np.arange(int(rate * seconds)) / (rate * (1.0 + random.uniform(-5e-5, 5e-5)))
+    clock, given = some_clock(random), {}
+    # What is set back by less than stamps scatter is not seen.
+    back = set_back(random, t, 2.5 / rate if other == "scatter" else 0.01, 3)
+    scatter = np.zeros(len(t))
+    kept = np.ones(len(t), dtype=bool)
+    if other == "lost":
+        kept[random.integers(100, len(t) - 100, int(random.integers(1, 30)))] = False
+    elif other == "scatter":
+        scatter = random.uniform(0.0, 0.4) / rate * random.uniform(-1.0, 1.0, len(t))
+    elif other == "slower":
+        given["arrivals"] = pulled(random, t + slower_way(random, t / t[-1]))
+    elif other == "counted":
+        given["counter"] = np.arange(len(t))
+    for right in ("before", "behind"):
+        wrong = back if right == "before" else back - back[-1]
+        corrected = correct(
+            (clock(t) - wrong + scatter)[kept],
+            probes=clock.probes(random, t[-1]),
+            rate_hz=rate,
+            **given,
+        )
+        off = np.abs(corrected.time - t[kept])
+        assert np.abs(corrected.time - corrected.uneven).max() < 1e-5
+        assert np.mean(off <= corrected.error) >= 0.99
+        if not given:
+            assert corrected.quality.shifts > 0

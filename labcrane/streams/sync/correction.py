@@ -289,12 +289,7 @@ def _evened(
         if sampling.strayed is not None:
             error[part] += sampling.strayed
         if sampling.shifted is not None:
-            count = segment.stop - segment.start
-            repeated = sampling.shifted.again_and_again
-            least = float(np.abs(sampling.shifted.by_s).max(initial=0.0)) if repeated else 0.0
-            error[part] += np.maximum(sampling.shifted.late(count), least)
-            if way is Dejitter.AUTO and segment.basis is Basis.PROBES:
-                time[part] -= sampling.shifted.surely(count)
+            error[part] += sampling.shifted.open_s(segment.stop - segment.start)
         if way is Dejitter.AUTO and followed is not None and segment.basis is Basis.PROBES:
             time[part], doubt = followed
             error[part] += doubt

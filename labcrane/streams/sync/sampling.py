@@ -104,8 +104,7 @@ class Sampling:
     kept_s
         Scatter of timestamps, as arrivals show, that could not be dejittered.
     back_s
-        By how much stamps go back, in sum, further than any buffer shrinks; of irregular streams
-        without arrivals, by how much their clock may have been set back.
+        By how much the clock of an irregular stream without arrivals may have been set back.
     behind
         Samples of those that lie behind an earlier one.
     """
@@ -201,7 +200,8 @@ def examine(
     else:
         found = _steps(time, index, grid, counted=counter is not None)
     grid = 0.0 if _on_grid(found, stamps[order], grid) else grid
-    if probed and not disordered and not grid:
+    shifted = found.exact and len(found.shifted.at) > 0
+    if probed and not disordered and not grid and not shifted:
         explained = found.computed and not found.missing and not found.clumped
         waited = receipt.find(time, index, explained=explained)
         if waited is not None:
@@ -228,7 +228,6 @@ def examine(
         _reach(found), late, steady, uncounted, None, found.shifted, stalls, longest,
         found.index if not disordered else index, uneven,
         found.strayed if not disordered and not rates else None, found.breaks,
-        0.0 if disordered else found.back,
     )  # fmt: skip
 
 
@@ -295,9 +294,8 @@ class _Steps:
     computed: bool
     clumped: bool
     balance: float
-    shifted: shifts.Shifts | None
+    shifted: shifts.Shifts
     strayed: FloatArray | None
-    back: float
 
 
 def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -> _Steps:
@@ -329,9 +327,10 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
         longer = np.isin(np.arange(len(steps)), hole.at[hole.broken])
     back = np.zeros(len(steps))
     if not computed:
-        back = holes.went_back(steps - counts * local, local, scatter)
+        back = holes.went_back(steps - counts * local, local, typical, scatter)
         breaks = np.union1d(breaks, np.flatnonzero(back)).astype(np.intp)
-    shifted = shifts.find(steps, counts, local, longer) if exact and not grid else None
+    known = (longer | (steps < counts * local)) & exact & (not grid)
+    shifted = shifts.find(steps - counts * local, local, back, known)
     gaps = np.maximum(whole - 1.0, beyond / local) > holes.LONGER
     missing = int((whole - 1.0).sum())
     position = index if counted else index[0] + np.r_[0.0, np.cumsum(whole)]
@@ -355,7 +354,6 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
     return _Steps(
         time, flowed, breaks + 1, mean, local, position, missing, int(gaps.sum()), longest, exact,
         computed, clumped, balance, shifted, strayed,
-        float(back.sum()),
     )  # fmt: skip
 
 
@@ -370,7 +368,7 @@ def _chunks(steps: FloatArray, usual: FloatArray) -> tuple[npt.NDArray[np.bool_]
     balance = abs(float(boundary.sum())) / moved if moved > 0.0 else 0.0
     between = boundary / usual[~same]
     fraction = np.abs(between - np.round(between)) > 0.05 if len(between) else np.zeros(0, bool)  # noqa: PLR2004
-    repeated = same.mean() > SAME and len(boundary) >= 5 and fraction.mean() > 0.5  # noqa: PLR2004
+    repeated = same.mean() > SAME and len(boundary) >= FEW and fraction.mean() > 0.5  # noqa: PLR2004
     # A chunk that waits for longer than the one before comes late, the next one early.
     early = boundary < -EQUAL_S
     both_ways = len(early) > 0 and float(early.mean()) > EARLIER

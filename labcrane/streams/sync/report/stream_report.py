@@ -220,10 +220,9 @@ def _stamping(quality: Quality, limits: Limits) -> list[Finding]:
         )
     if quality.shifts:
         text = f"{quality.shifts} times its timestamps shifted, by {1e3 * quality.shift_s:.0f} ms "
-        text += "at most: it paused, or its delay changed"
-        _add(
-            found, Verdict.WARN, text, "later samples may be late by that much; they are not moved"
-        )
+        text += "at most: it paused, its delay changed, or its clock was set"
+        advice = "samples before and after may be off by that much; they are not moved"
+        _add(found, Verdict.WARN, text, advice)
     if quality.grid_s:
         unit = f"{1e3 * quality.grid_s:g} ms"
         text = f"its timestamps are cut to {unit}; their uncertainty includes half of that"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.streams.sync.stamping.shifts import MOST_S
+from labcrane.streams.sync.stamping.shifts import LEAST_S, PART
 from labcrane.types import FloatArray
 
 LONGER = 0.5
@@ -133,30 +133,31 @@ def find(
     return Holes(at, periods, broken & ~untold, untold & (periods > LONGER), usual[at])
 
 
-def went_back(late: FloatArray, usual: FloatArray, scatter: float) -> FloatArray:
+def went_back(late: FloatArray, usual: FloatArray, typical: float, scatter: float) -> FloatArray:
     """Return by how much stamps go back in each step, and do not return, shape ``(n - 1,)``.
 
-    In seconds, and by more than a buffer shrinks: a clock was set, and nothing tells whether it was
-    right before or is now.
+    In seconds: a clock was set, or a buffer shrank, and nothing tells whether stamps were right
+    before or are now.
 
     Parameters
     ----------
     late
         By how much each step is longer than it should be, in seconds, shape ``(n - 1,)``.
-    usual
-        The period around each, in seconds.
+    usual, typical
+        The period around each, and that of all, in seconds.
     scatter
         Of the steps, a standard deviation.
     """
-    level, found = np.r_[0.0, np.cumsum(late)], np.zeros(len(late))
-    for k in np.flatnonzero(late < -np.maximum(MOST_S, SURE * scatter)):
-        far = max(round(PASSING_S / float(usual[k])), LEVEL)
+    least = np.maximum(np.maximum(LEAST_S, PART * usual), SURE * scatter)
+    level, found = np.r_[0.0, np.cumsum(late + usual - typical)], np.zeros(len(late))
+    for k in np.flatnonzero((late < -least) & _alone(np.abs(late) > least)):
+        far = max(round(PASSING_S / typical), LEVEL)
         near, lasting = (
             float(np.median(level[max(k + 1 - n, 0) : k + 1]) - np.median(level[k + 1 : k + 1 + n]))
             for n in (LEVEL, far)
         )
-        if min(near, lasting) > MOST_S / 2.0:
-            found[k] = near + SURE * scatter
+        if max(abs(near + late[k]), abs(lasting + late[k])) < -late[k] / 2.0:
+            found[k] = max(near, -float(late[k])) + SURE * scatter
     return found
 
 
