@@ -21,6 +21,8 @@ class Drawn:
     ``lag_s`` is how long its samples are under way: arrivals cannot tell that from a clock that is
     behind, and the uncertainty must say so.
     ``grid_s`` is what its stamps are cut to: whether they are half of it early, nothing tells.
+    ``uneven_s`` is by how much its samples may lie beside an even count: whether its stamps do, and
+    not its samples, nothing tells either.
     ``perhaps`` is what may be named or not: a step of a millisecond, say, is a slew as well.
     """
 
@@ -37,6 +39,7 @@ class Drawn:
     chance: bool = False
     lag_s: float = 0.0
     grid_s: float = 0.0
+    uneven_s: float = 0.0
 
 
 @dataclass
@@ -144,8 +147,9 @@ def lost(random, rate, share, most):
 def eye_tracker(random):
     rate = float(random.choice([60.0, 120.0]))
     times = np.sort(regular(random, rate))
-    times = times + random.normal(0.0, random.uniform(0.5e-3, 3e-3), len(times))
-    return received(random, Clock(random), np.sort(times), rate)
+    scatter = random.uniform(0.5e-3, 3e-3)
+    times = times + random.normal(0.0, scatter, len(times))
+    return received(random, Clock(random), np.sort(times), rate, uneven_s=3.0 * scatter)
 
 
 def changed_rate(random):
@@ -161,7 +165,9 @@ def warming(random):
     n = int(rate * random.uniform(250, 500))
     rates = rate * (1 + random.uniform(0.005, 0.015) * np.exp(-np.arange(n) / rate / 90.0))
     times = START + np.cumsum(1 / rates)
-    return received(random, Clock(random), times, rate, faults=frozenset({Fault.CHANGED_RATE}))
+    return received(
+        random, Clock(random), times, rate, faults=frozenset({Fault.CHANGED_RATE}), uneven_s=3e-4
+    )
 
 
 def receivers_clock(random):

@@ -71,7 +71,7 @@ def score(row: str, seed: int, *, usual: bool = False) -> Score:
         verdict is Verdict.PASS, theirs,
         float(np.quantile(raw, 0.95)), named, drawn.faults, drawn.clean, drawn.limit_ms, len(error),
         float(np.quantile(apart, 0.95)), theirs_apart, drawn.apart_ms,
-        drawn.chance, 1e3 * (drawn.lag_s + drawn.grid_s),
+        drawn.chance, 1e3 * (drawn.lag_s + drawn.grid_s + drawn.uneven_s),
         1e3 * float(np.quantile(corrected.error, 0.95)),
     )  # fmt: skip
 

@@ -397,7 +397,7 @@ def camera(random):
             steps += [period] * max(int(turns * random.uniform(0.5, 1.5) / period), 1)
     times = START + np.cumsum(steps[: int(random.uniform(4000, 8000))])
     either = frozenset({Fault.WRONG_RATE, Fault.CHANGED_RATE, Fault.LOST})
-    drawn = received(random, Clock(random), times, 30.0, perhaps=either)
+    drawn = received(random, Clock(random), times, 30.0, perhaps=either, uneven_s=np.inf)
     if random.random() < 0.5:
         return drawn
     stamps = np.floor(drawn.raw.stamps * 1e3) / 1e3

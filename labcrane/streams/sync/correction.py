@@ -284,7 +284,7 @@ def _evened(
         part = slice(segment.start, segment.stop)
         # Nothing tells cut stamps from rounded ones, and so whether they are half a unit early.
         error[part] += sampling.grid_s / 2.0 + sampling.back_s + sampling.kept_s
-        if not len(raw.arrivals):  # nothing shows whether samples or their stamps are uneven
+        if not treatment.can_drop_samples:  # nothing else tells uneven samples from late stamps
             error[part] += NEARLY_ALL * sampling.uneven_s
         if sampling.strayed is not None:
             error[part] += sampling.strayed

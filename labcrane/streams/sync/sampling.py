@@ -83,7 +83,7 @@ class Sampling:
     steady
         Whether evening helps: the scatter is the stamps', and the sample clock is steady.
     uncounted
-        Whether samples are missing, and nothing tells where.
+        Whether samples may be missing among those stamped late, and nothing tells where.
     received
         How samples waited before they were stamped, or were taken: either may be; None where
         nothing shows that they did.
@@ -222,7 +222,7 @@ def examine(
     noise, late, by_grid, uneven = _noise(time, arrival, found, grid)
     rates = _rates(found)
     steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
-    uncounted = late and found.missing > 0 and counter is None
+    uncounted = late and counter is None and (found.clumped or found.missing > 0)
     return Sampling(
         found.period, found.missing, found.gaps, found.longest, disordered, rates, noise, grid,
         _reach(found), late, steady, uncounted, None, found.shifted, stalls, longest,

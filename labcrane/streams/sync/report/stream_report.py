@@ -241,8 +241,8 @@ def _scatter(quality: Quality, limits: Limits) -> list[Finding]:
         text = f"its timestamps scatter by {1e3 * quality.noise_s:.2f} ms about its samples"
         _add(found, Verdict.WARN, text, "let its program stamp with LSL's clock at full resolution")
     elif quality.uneven_s > limits.error_s.warn / FURTHEST:
-        text = f"its timestamps are up to {1e3 * quality.uneven_s:.2f} ms off a regular grid, and "
-        text += "arrive so: its samples are irregular, or late by as much; both look alike"
+        text = f"its timestamps are up to {1e3 * quality.uneven_s:.2f} ms off a regular grid: "
+        text += "its samples are irregular, or late by as much; both look alike"
         _add(found, Verdict.WARN, text, "if its sampler is steady, let its program stamp sooner")
     return found
 

@@ -118,7 +118,7 @@ def find(
     else:
         odd = np.maximum(LONGER * usual, SURE * scatter)
         away = steps - usual
-        usual = _flowing(steps, usual, np.abs(away) <= odd)
+        usual = _flowing(steps, usual, np.abs(away) <= odd) if exact else _by_spans(steps)
         away = steps - usual
         chosen = away > odd
         if not exact:
@@ -161,6 +161,13 @@ def went_back(late: FloatArray, usual: FloatArray, typical: float, scatter: floa
     return found
 
 
+def _by_spans(steps: FloatArray) -> FloatArray:
+    """Return the mean of most spans of steps: the longest of those that scatter are late, too."""
+    span = min(5 * LEVEL, len(steps))
+    sums = np.r_[0.0, np.cumsum(steps)]
+    return np.full(len(steps), float(np.median(sums[span:] - sums[:-span])) / span)
+
+
 def _flowing(steps: FloatArray, usual: FloatArray, even: npt.NDArray[np.bool_]) -> FloatArray:
     """Return the mean of usual steps around each, which scatter hardly blurs."""
     blocks = np.array_split(np.arange(len(steps)), max(len(steps) // MANY, 1))
@@ -190,7 +197,8 @@ def _size(
     step = float(late[here] - late[here - 1])
     last = here + max(round(PASSING_S / period), int(2.0 * step / period)) + LEVEL
     remains = float(late[here:last].min() - late[begin:here].min())
-    if step - remains > max(MADE_GOOD * step, (LONGER + TOLD) * period, SURE * scatter):
+    made_good = step - remains > max(MADE_GOOD * step, (LONGER + TOLD) * period, SURE * scatter)
+    if made_good or remains < LONGER * period:  # or the soonest are no later than before
         return remains if remains > max(REST * step, 1.5 * period) else 0.0
     if scatter < BROKEN * period:
         return step
