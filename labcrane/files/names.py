@@ -79,6 +79,9 @@ MISSING = frozenset(
 )  # fmt: skip
 """Words that pandas, R or BIDS read as a missing value by default."""
 
+READ_OTHERWISE = frozenset({"f", "inf", "infinity", "na", "t"})
+"""Pseudonyms that tables do not hold as text."""
+
 HASHED = 8
 
 COHORT = "cohort.yaml"
@@ -123,6 +126,8 @@ def misfit(name: str, *, person: bool = True) -> str | None:
         return "is a device name on Windows; use another name"
     if not person:
         return None
+    if low in READ_OTHERWISE:
+        return "is read by R or pandas as a missing value, a truth or infinity; use another name"
     if low in OURS:
         return "is reserved for labcrane's own files; use another name"
     for stamp in STAMPS:
@@ -134,10 +139,15 @@ def misfit(name: str, *, person: bool = True) -> str | None:
 def twin_key(name: str) -> str:
     """Return a key that is equal for two names that some disk or format treats as the same.
 
-    Upper and lower case, forms of the same letter, and whatever is neither letter nor digit.
+    Upper and lower case, forms of the same letter, and whatever is neither letter nor digit. Names
+    that are numbers are the same where the numbers are: R and pandas read 001, 01 and 1 alike.
     """
     folded = unicodedata.normalize("NFKC", name).casefold()
-    return "".join(letter for letter in folded if letter.isalnum())
+    key = "".join(letter for letter in folded if letter.isalnum())
+    try:
+        return repr(float(key))
+    except ValueError:
+        return key
 
 
 def file_name_of(text: str) -> str:

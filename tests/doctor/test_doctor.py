@@ -188,7 +188,7 @@ def test_a_diagnosis_that_cannot_be_kept_is_told(tmp_path: Path) -> None:
     (tmp_path / "data").write_text("no folder")
     found = keep_apart(diagnosis([]), tmp_path / "data")
     assert found.verdict is Verdict.FAIL
-    assert found.text.startswith(f"examining folder {tmp_path / 'data'} raised RecordingError: ")
+    assert found.text.startswith(f"examining folder {tmp_path / 'data'} raised StorageError: ")
 
 
 def test_a_study_needs_looks_at_what_it_uses_and_at_nothing_else() -> None:

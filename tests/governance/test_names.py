@@ -3,8 +3,10 @@
 import re
 import stat
 import unicodedata
+from io import StringIO
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from governance.kept_people import REASON, store_of
 from governed import TODAY, Lab
@@ -58,6 +60,21 @@ def test_a_name_that_passes_is_one_folder_of_its_own_on_every_disk(name: str) ->
     assert low not in {"con", "prn", "aux", "nul", "com1", "lpt9"} | DEVICES
     assert low not in {"register", "exports"} | OURS
     assert not low.endswith(("-pilot", "-simulated"))
+
+
+@pytest.mark.parametrize("name", ["NA", "na", "T", "F", "t", "Inf", "inf"])
+def test_a_name_that_a_table_does_not_hold_as_text_is_refused(name: str) -> None:
+    with pytest.raises(ProtocolError, match="is read by R or pandas as a missing value, a truth"):
+        check_name(name, "participant")
+
+
+@settings(max_examples=300)
+@given(st.lists(st.from_regex(r"\A[0-9]{1,4}(E[0-9]{1,2})?\Z"), min_size=2, max_size=6))
+@example(["001", "01", "1"])
+@example(["1E05", "1E5", "100000"])
+def test_of_names_that_pandas_reads_as_one_number_one_is_let_in(names: list[str]) -> None:
+    text = "\n".join(["participant", *admitted(names)])
+    assert pd.read_csv(StringIO(text))["participant"].is_unique
 
 
 @given(ANY)

@@ -139,7 +139,9 @@ def test_recover_makes_the_file_again_of_the_journals(recorded: Path, tmp_path: 
 
 
 def test_recover_says_when_there_is_nothing(tmp_path: Path) -> None:
-    assert f"no journals below {tmp_path}" in labcrane("recover", tmp_path).stdout.replace("\n", "")
+    (tmp_path / "data").mkdir()
+    said = labcrane("recover", tmp_path).stdout.replace("\n", "")
+    assert f"no journals below {tmp_path / 'data'}" in said
 
 
 @pytest.mark.slow
