@@ -54,7 +54,7 @@ class StorageError(RecordingError):
 
     @classmethod
     def of(cls, error: OSError) -> "StorageError":
-        """Return what the computer said of a file, and what to do."""
+        """Return the computer's message about a file, and what to do."""
         where = error.filename or "a file"
         return cls(
             f"{where}: {error.strerror or error}; nothing recorded is affected: make room, close "

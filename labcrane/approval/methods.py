@@ -54,7 +54,7 @@ def _people(protocol: Mapping[str, Any]) -> list[str]:
 
 
 def _parts(protocol: Mapping[str, Any], settings: Mapping[str, Any]) -> list[str]:
-    """Return the tasks and feedback with what the protocol says of each, and tasks' other settings.
+    """Return the tasks and feedback with the protocol's words for each, and tasks' other settings.
 
     Rules of onset and end are among them. An early lock has neither units nor the others.
     """

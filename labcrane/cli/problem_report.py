@@ -66,7 +66,7 @@ TEXTS = ("clock", "scheduling")
 """Areas whose texts quote nothing that a person named."""
 
 OTHER = "(another)"
-"""What stands for a name that is not labcrane's."""
+"""Takes the place of a name that is not labcrane's."""
 
 WORST = 20
 """Ticks that are listed as the latest."""

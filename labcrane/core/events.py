@@ -27,11 +27,11 @@ class EventKind:
         Its number on the stream of codes and on triggers, 2 to 255; a number, once given, never
         changes its meaning. None where the event is only recorded or told, and not a marker.
     meaning
-        For whoever analyses the recording.
+        For the analysis of the recording.
     tags
         Tags of Hierarchical Event Descriptors, without the label.
     sentence
-        For whoever runs the session, with the event's data in braces; empty where code makes it.
+        For the experimenter, with the event's data in braces; empty where code makes it.
     kind, level
         By what the page filters it, and ``"bad"`` if the experimenter must act or ``"warn"`` if the
         experimenter should know.

@@ -17,7 +17,7 @@ from labcrane_bids.dataset import (
 from labcrane_bids.eeg import eeg_description, write_eeg
 from labcrane_bids.events import event_description, event_table, screen_of
 from labcrane_bids.files import (
-    Labels,
+    EntityLabels,
     first_tick,
     label,
     write_bare_tsv,
@@ -54,7 +54,7 @@ class Bids(Exporter):
         self._settings = settings
         self._machine = machine
         self._without: set[str] = set()
-        self._labels = Labels()
+        self._labels = EntityLabels()
 
     def export(self, participants: Iterable[Participant], folder: Path) -> None:
         rows, contexts = [], []

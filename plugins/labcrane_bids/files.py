@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 MISSING = "n/a"
 
 EYE = re.compile(r"eye\d+", re.IGNORECASE)
-"""Labels that BIDS keeps for recordings of eyes."""
+"""EntityLabels that BIDS keeps for recordings of eyes."""
 
 ROWS = 1 << 16
 """Samples that are in memory at a time."""
@@ -31,8 +31,8 @@ def label(text: str) -> str:
     return "".join(letter for letter in text if letter.isascii() and letter.isalnum())
 
 
-class Labels:
-    """Labels of streams or questionnaires, one for each name; no two differ in case alone.
+class EntityLabels:
+    """EntityLabels of streams or questionnaires, one for each name; no two differ in case alone.
 
     One object serves a whole data set, so that a name has one label in all its sessions.
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis import Participant, asked_in, scores_of
 from labcrane.core import Item
-from labcrane_bids.files import Labels, label, write_json, write_tsv
+from labcrane_bids.files import EntityLabels, label, write_json, write_tsv
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,7 +78,7 @@ class Phenotype:
         """Write the tables; return what they would be called in ``phenotype``."""
         import pandas as pd
 
-        task_of, table_of = Labels(fallback=FALLBACK), Labels(label_of, FALLBACK)
+        task_of, table_of = EntityLabels(fallback=FALLBACK), EntityLabels(label_of, FALLBACK)
         tables = [table_of(name) for name in self._rows]
         for name, rows in self._rows.items():
             table = pd.DataFrame(rows)

@@ -155,7 +155,7 @@ def begin(folder: Path, number: int) -> dict[str, object]:
             if "space to start" in line:
                 run.stdin.write("start\n")
                 run.stdin.flush()
-            if "block 1" in line and took is None:
+            if "Block 1 began" in line and took is None:
                 took = time.monotonic() - began
                 over.set()
                 run.stdin.write("end\n")

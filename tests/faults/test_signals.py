@@ -72,7 +72,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
     try:
         said.until("space to start")
         said.order("start")
-        said.until("block 1")
+        said.until("Block 1 began")
         head.make("flat", 3)
         said.until("eeg E3: flat line: ")
         head.make("live", 3)

@@ -132,7 +132,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
         sender.start()
         said.until("space to start")
         said.order("start")
-        said.until("block 1")
+        said.until("Block 1 began")
         sender.kill()
         said.until("Stream eeg is lost")
         sender.start(first=100_000)

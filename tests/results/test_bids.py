@@ -19,7 +19,7 @@ from labcrane.analysis.measures import measures_of
 from labcrane.design.plan import plan_session
 from labcrane.testing import ch8
 from labcrane_bids.bids import Bids
-from labcrane_bids.files import Labels
+from labcrane_bids.files import EntityLabels
 from labcrane_bids.settings import BidsSettings
 from results.consumers import bids_errors, under
 from results.recorded import STUDY, record, study
@@ -258,7 +258,7 @@ def test_streams_of_names_that_look_alike_are_files_of_their_own(tmp_path: Path)
 def test_every_name_has_a_label_of_its_own_and_keeps_it(seed: int) -> None:
     random = Random(seed)
     names = ["".join(random.choices("aAbB1 _-.é心", k=random.randint(1, 3))) for _ in range(200)]
-    labels = Labels()
+    labels = EntityLabels()
     given = {name: labels(name) for name in names}
     assert all(re.fullmatch("[A-Za-z0-9]+", label) for label in given.values())
     assert len({label.lower() for label in given.values()}) == len(given)

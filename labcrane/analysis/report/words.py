@@ -262,7 +262,7 @@ def verdict(row: Mapping[str, Any], style: Style) -> str:
 
 
 def depends(tests: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """Return what is said of each main effect whose factor is in an interaction that was found."""
+    """Return what to add to each main effect whose factor is in an interaction that was found."""
     others: dict[str, list[str]] = {}
     for row in tests:
         parts = str(row["factor"]).partition(" ")[0].split(":")

@@ -167,8 +167,8 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel:
     scatter = _scatter(x, y, np.column_stack(list(random.values())), ones)
     if scatter <= LEAST_SCATTER * float(y.std()):
         raise NoModelError(
-            "the terms and each participant's means and slopes fit every value exactly, so there "
-            "is no residual variance to test against"
+            "the terms and each participant's means and slopes fit every value exactly; no "
+            "residual variance is left to test against"
         )
     fit = _Fit(x, y, list(random.values()), ones, scatter)
     errors, freedom = fit.errors, fit.freedom

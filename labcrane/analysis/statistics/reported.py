@@ -91,7 +91,7 @@ STEPS = 9
 """Steps over the range of a rounded degree of freedom."""
 
 SLACK = 1e-9
-"""Of the ends of a range: decimal fractions are no binary ones."""
+"""Of the ends of a range: binary fractions cannot hold decimal ones."""
 
 
 def _compared(text: str) -> tuple[str, str]:

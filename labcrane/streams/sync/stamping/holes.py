@@ -198,7 +198,7 @@ def _size(
     last = here + max(round(PASSING_S / period), int(2.0 * step / period)) + LEVEL
     remains = float(late[here:last].min() - late[begin:here].min())
     made_good = step - remains > max(MADE_GOOD * step, (LONGER + TOLD) * period, SURE * scatter)
-    if made_good or remains < LONGER * period:  # or the soonest are no later than before
+    if made_good or remains < LONGER * period:  # or the soonest came as early
         return remains if remains > max(REST * step, 1.5 * period) else 0.0
     if scatter < BROKEN * period:
         return step
