@@ -145,12 +145,14 @@ def test_a_joint_reversed_at_once_moves_no_joint_that_nobody_asked(model: str, j
 def test_a_crane_sinks_alike_under_a_load_that_its_drives_cannot_hold(
     model: str, payload_kg: float
 ) -> None:
+    """Until a joint is driven into its stop, which each engine models in its own way."""
     machine, random = load_machine(model), np.random.default_rng()
     stretched = np.radians([0.0, 0.0, 5.0, 10.0])
     drawn = [0.9 * random.uniform(*np.array(machine.limits).T) for _ in range(8)]
     for pose in (stretched, *drawn):
         one, other = both(machine, pose, np.zeros((round(3.0 * RATE_HZ), 4)), payload_kg, "ideal")
-        assert apart(machine, one, other)[1] < 0.1
-        assert abs(other[-1, 10] - one[-1, 10]) < 0.05
+        free = free_ticks(machine, one, other)
+        assert apart(machine, one[:free], other[:free])[1] < 1e-6
         if pose is stretched:
+            assert abs(other[-1, 10] - one[-1, 10]) < 0.05
             assert one[0, 10] - one[-1, 10] > 1.0
