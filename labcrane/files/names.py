@@ -140,14 +140,18 @@ def twin_key(name: str) -> str:
     """Return a key that is equal for two names that some disk or format treats as the same.
 
     Upper and lower case, forms of the same letter, and whatever is neither letter nor digit. Names
-    that are numbers are the same where the numbers are: R and pandas read 001, 01 and 1 alike.
+    that are numbers are the same where the numbers are: R and pandas read 001, 01 and 1 alike, and
+    R reads 0x10 as 16.
     """
     folded = unicodedata.normalize("NFKC", name).casefold()
     key = "".join(letter for letter in folded if letter.isalnum())
+    number = key.removesuffix("i")  # R reads 2i as complex, and 2e as 2
+    number = number.removesuffix("e") if not number.startswith("0x") else number
     try:
-        return repr(float(key))
-    except ValueError:
+        value = float.fromhex(number) if number.startswith("0x") else float(number)
+    except (ValueError, OverflowError):
         return key
+    return f"{value!r}i" if key.endswith("i") else repr(value)
 
 
 def file_name_of(text: str) -> str:

@@ -1,7 +1,9 @@
 """Names of participants, studies and streams: what passes at the door can be handled everywhere."""
 
+import random
 import re
 import stat
+import subprocess
 import unicodedata
 from io import StringIO
 from pathlib import Path
@@ -75,6 +77,21 @@ def test_a_name_that_a_table_does_not_hold_as_text_is_refused(name: str) -> None
 def test_of_names_that_pandas_reads_as_one_number_one_is_let_in(names: list[str]) -> None:
     text = "\n".join(["participant", *admitted(names)])
     assert pd.read_csv(StringIO(text))["participant"].is_unique
+
+
+@needs("Rscript")
+def test_of_names_that_r_reads_as_one_number_one_is_let_in() -> None:
+    dice = random.Random()
+    forms = (hex, str, "0{:x}".format, "0X{:X}".format, "0{}i".format, "{}e".format)
+    names = [dice.choice(forms)(dice.randrange(60)) for _ in range(100)]
+    people = admitted([*names, "0x10", "16", "016", "0X10", "16e", "16i", "016i"])
+    # Each in a column of its own, so that R takes it for a number where it can.
+    alone = ", ".join(f'read.csv(text = "p\\n{name}")$p' for name in people)
+    asked = f'cat(sapply(list({alone}), as.character), sep = "\\n")'
+    done = subprocess.run(["Rscript", "-e", asked], capture_output=True, text=True, check=True)
+    values = done.stdout.split()
+    assert len(values) == len(people)
+    assert len(set(values)) == len(values)
 
 
 @given(ANY)
