@@ -284,6 +284,7 @@ def _evened(
         part = slice(segment.start, segment.stop)
         # Nothing tells cut stamps from rounded ones, and so whether they are half a unit early.
         error[part] += sampling.grid_s / 2.0 + sampling.back_s + sampling.kept_s
+        error[part] += sampling.unsure_s
         if not treatment.can_drop_samples:  # nothing else tells uneven samples from late stamps
             error[part] += NEARLY_ALL * sampling.uneven_s
         if sampling.strayed is not None:
@@ -407,6 +408,7 @@ def _flow(placed: Placement, sampled: list[_Sampled], *, regular: bool) -> dict[
     strays = [one.strayed for one in each if one.strayed is not None]
     told = {
         "dropped": sum(one.missing for one in each),
+        "uncounted": int(any(one.uncounted for one in each)),
         "disordered": sum(one.disordered for one in each),
         "stalls": sum(one.stalls for one in each),
         "longest_stall_s": max((one.longest_stall_s for one in each), default=0.0),

@@ -75,6 +75,8 @@ class Quality:
         Interruptions of regular streams.
     dropped
         Samples that are missing, by the source's own counter or by whole periods between stamps.
+    uncounted
+        1 where stamps scatter by so much that single lost samples cannot be counted.
     disordered
         Samples that came after one stamped later.
     stalls, longest_stall_s
@@ -135,6 +137,7 @@ class Quality:
     gaps: int = 0
     longest_gap_s: float = 0.0
     dropped: int = 0
+    uncounted: int = 0
     disordered: int = 0
     stalls: int = 0
     longest_stall_s: float = 0.0

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.streams.sync.stamping import holes, receipt, shifts, strays, units
+from labcrane.streams.sync.stamping import holes, levels, receipt, shifts, strays, units
 from labcrane.streams.sync.stamping.late_chunks import lost_before, lost_between, slope, soonest
 from labcrane.types import FloatArray
 
@@ -83,7 +83,7 @@ class Sampling:
     steady
         Whether evening helps: the scatter is the stamps', and the sample clock is steady.
     uncounted
-        Whether samples may be missing among those stamped late, and nothing tells where.
+        Whether samples may be missing, and stamps scatter by too much to tell how many, or where.
     received
         How samples waited before they were stamped, or were taken: either may be; None where
         nothing shows that they did.
@@ -101,6 +101,9 @@ class Sampling:
         none is.
     breaks
         The samples behind holes of which nothing shows how many periods they are.
+    unsure_s
+        By how much samples near a loss may be off, shape ``(n,)``: which of them came before it is
+        not known.
     kept_s
         Scatter of timestamps, as arrivals show, that could not be dejittered.
     back_s
@@ -129,6 +132,7 @@ class Sampling:
     uneven_s: float = 0.0
     strayed: FloatArray | None = None
     breaks: npt.NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    unsure_s: FloatArray | float = 0.0
     back_s: float = 0.0
     kept_s: float = 0.0
     behind: int = 0
@@ -201,8 +205,13 @@ def examine(
         found = _steps(time, index, grid, counted=counter is not None)
     grid = 0.0 if _on_grid(found, stamps[order], grid) else grid
     shifted = found.exact and len(found.shifted.at) > 0
+    level, scattered = None, False
     if probed and not disordered and not grid and not shifted:
         explained = found.computed and not found.missing and not found.clumped
+        scattered = counter is None and not found.exact and not found.computed
+        level = levels.find(time, found.period) if scattered else None
+        if level is not None:
+            index = index + level.lost
         waited = receipt.find(time, index, explained=explained)
         if waited is not None:
             pauses = np.diff(index) > 1.5  # noqa: PLR2004
@@ -218,17 +227,35 @@ def examine(
                 stalls=stalls,
                 longest_stall_s=longest,
                 index=index,
+                unsure_s=0.0 if level is None else level.unsure * waited.period,
+                uncounted=scattered and level is None,
             )
     noise, late, by_grid, uneven = _noise(time, arrival, found, grid)
     rates = _rates(found)
     steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
     uncounted = late and counter is None and (found.clumped or found.missing > 0)
+    uncounted |= scattered and level is None
     return Sampling(
-        found.period, found.missing, found.gaps, found.longest, disordered, rates, noise, grid,
-        _reach(found), late, steady, uncounted, None, found.shifted, stalls, longest,
-        found.index if not disordered else index, uneven,
-        found.strayed if not disordered and not rates else None, found.breaks,
-    )  # fmt: skip
+        found.period,
+        missing=found.missing if level is None else int(level.lost[-1]),
+        gaps=found.gaps,
+        longest_gap_s=found.longest,
+        disordered=disordered,
+        rates_hz=rates,
+        noise_s=noise,
+        grid_s=grid,
+        reach_s=_reach(found),
+        late_stamps=late,
+        steady=steady,
+        uncounted=uncounted,
+        shifted=found.shifted,
+        stalls=stalls,
+        longest_stall_s=longest,
+        index=index if disordered else found.index,
+        uneven_s=uneven,
+        strayed=None if disordered or rates else found.strayed,
+        breaks=found.breaks,
+    )
 
 
 def examine_irregular(

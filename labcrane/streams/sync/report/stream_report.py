@@ -185,6 +185,9 @@ def _flow(nominal: float, samples: int, quality: Quality, limits: Limits) -> lis
         f"{quality.dropped} samples are missing, by its counter or by its timestamps",
         "check the link between device and its program",
     )
+    if quality.uncounted:
+        text = "its timestamps scatter by too much to count single lost samples"
+        _add(found, Verdict.WARN, text, "let its program send a counter, and name it in the study")
     return found
 
 
