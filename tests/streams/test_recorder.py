@@ -199,6 +199,38 @@ def test_a_source_that_comes_back_in_this_session_is_not_warned_of(lab):
     assert "warning" not in events(lab.streams()["Amplifier"])
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("shape", "said"),
+    [
+        ({"channels": 5}, "5 channels instead of 2"),
+        ({"form": "double64"}, "another format of its samples"),
+    ],
+)
+def test_a_source_that_comes_back_in_another_shape_is_recorded_as_a_new_stream(lab, shape, said):
+    """Nothing of a device with another montage was recorded any more, without a word."""
+    first = lab.sender("Amplifier", "EEG", "amplifier-1")
+    recorder = lab.recorder(AMPLIFIER)
+    until_ready(recorder)
+    first.kill()
+    first.wait()
+    until(recorder, lambda status: status["streams"][0]["condition"] == "silent")
+    lab.sender("Amplifier", "EEG", "amplifier-1", first=1_000_000, **shape)
+    until(recorder, lambda status: not status["ready"])
+    status = until(recorder, lambda status: status["ready"] and len(status["streams"]) == 2)
+    before, now = status["streams"]
+    assert not before["required"]
+    assert now["condition"] == "flows"
+    for one in (before, now):
+        assert f"came back with {said}" in " ".join(one["warnings"])
+    assert stop(recorder) == 0
+    recorded, _ = read_streams(parts(lab.journal))
+    counts = [stream.data[:, 0] for stream in recorded]
+    assert [len(stream.header.channels) for stream in recorded] == [2, shape.get("channels", 2)]
+    assert counts[0][-1] < 1_000_000 <= counts[1][0]
+    assert (np.diff(counts[1]) == 1.0).all()
+
+
 def test_a_required_stream_that_is_not_what_was_expected_holds_the_session_back(lab):
     lab.sender("Amplifier", "EEG", "amplifier-1", rate=200.0)
     recorder = lab.recorder(EEG | {"channels": 64})

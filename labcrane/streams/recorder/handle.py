@@ -228,4 +228,4 @@ class _Recorder(ProcessHandle):
 
 
 def _key(stream: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(str(stream[name]) for name in ("label", "name", "type", "source_id"))
+    return tuple(str(stream[name]) for name in ("label", "name", "type", "source_id", "channels"))

@@ -29,6 +29,10 @@ FORGET_S = 3.0
 """A stream that has gone is listed for so long; only then is another one of its id a duplicate."""
 
 
+_Key = tuple[str, str, str, int, int]
+"""What liblsl knows a stream by when its program is started again: id, name, type and shape."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Recorded:
     request: StreamRequest
@@ -73,13 +77,13 @@ class Recorder:
         self._requests = tuple(sorted(requests, key=lambda one: one.by_type_alone))
         self._candidates: dict[str, list[Candidate]] = {}
         self._writer = XdfWriter(next_part(journal) if part is None else part_path(journal, part))
-        self._streams: dict[tuple[str, str, str], _Recorded] = {}
-        self._latest: dict[tuple[str, str, str], pylsl.StreamInfo] = {}
-        self._there: set[tuple[str, str, str]] = set()
+        self._streams: dict[_Key, _Recorded] = {}
+        self._latest: dict[_Key, pylsl.StreamInfo] = {}
+        self._there: set[_Key] = set()
         self._since: dict[str, float] = {}
-        self._unseen: dict[tuple[str, str, str], float] = {}
+        self._unseen: dict[_Key, float] = {}
         """Since when no search finds a stream, on our clock."""
-        self._rivalled: set[tuple[str, str, str]] = set()
+        self._rivalled: set[_Key] = set()
         self._fault: str | None = None
         self._feed = None if monitors is None else SignalFeed(monitors)
         self.know(known)
@@ -128,7 +132,12 @@ class Recorder:
     def health(self) -> list[Health]:
         """Return how each stream is now, also those asked for that are not there."""
         now = time.perf_counter()
-        found = [_health(one, now, self._rivals(one)) for one in self._streams.values()]
+        found = []
+        for key, one in self._streams.items():
+            health = _health(one, now, self._rivals(one))
+            if (shape := self._shape_now(key)) is not None:  # what is required is the new one
+                health = replace(health, required=False, warnings=[*health.warnings, shape])
+            found.append(health)
         there = {one.request.label for one in self._streams.values()}
         return found + [self._absent(one) for one in self._requests if one.label not in there]
 
@@ -198,8 +207,15 @@ class Recorder:
         taken = request.taken(info.name(), info.source_id(), info.hostname())
         if (unstable := unstable_id(info.source_id())) is not None:
             warnings.append(unstable)
+        before = [one for one in self._streams if one[:3] == key[:3] and one not in self._there]
+        warnings += [_returned(one, key) for one in before[-1:]]
         inlet = Inlet(info, self._writer, request.counter, (*warnings,), self._feed, taken)
         self._streams[key] = _Recorded(request, inlet, misfits, warnings, taken or "")
+
+    def _shape_now(self, key: _Key) -> str | None:
+        """Say how a stream came back that has another shape now; None if it is there, or gone."""
+        now = (one for one in self._there if one[:3] == key[:3] and one in self._streams)
+        return None if key in self._there else next((_returned(key, one) for one in now), None)
 
     def _note_rivals(self) -> None:
         """Note once beside each stream that it is not the only one that fits."""
@@ -230,8 +246,7 @@ class Recorder:
             alike = [
                 info
                 for info in found
-                if (info.source_id(), info.name(), info.type()) == key
-                and now - self._since[info.uid()] > 2 * FORGET_S
+                if _key(info) == key and now - self._since[info.uid()] > 2 * FORGET_S
             ]
             if len(alike) > 1:
                 hosts = " and ".join(sorted(info.hostname() for info in alike))
@@ -242,12 +257,14 @@ class Recorder:
     def _find_strangers(self, found: "list[pylsl.StreamInfo]") -> None:
         """Warn of a source that came back and may be another: liblsl takes any that looks alike.
 
-        What it searches for when it has lost a source is the name, the type and the source_id, in
-        every LSL session and on every computer.
+        What it searches for when it has lost a source is the name, the type, the source_id and the
+        shape, in every LSL session and on every computer.
         """
         for key, recorded in self._streams.items():
             flow = recorded.inlet.flow
             if (now_on := self._alike(recorded, found)) is None:
+                if self._shape_now(key) is not None:
+                    continue
                 since = max(self._unseen.setdefault(key, time.perf_counter()), flow.reset_at)
                 if flow.resets and flow.last - since > 2 * FORGET_S:
                     recorded.warn(
@@ -265,14 +282,21 @@ class Recorder:
     def _alike(recorded: _Recorded, found: "list[pylsl.StreamInfo]") -> str | None:
         """Return the computer that sends such a stream now; None when no search finds one."""
         was = recorded.inlet.info
-        looks = was.source_id(), was.name(), was.type()
-        alike = (one for one in found if (one.source_id(), one.name(), one.type()) == looks)
+        looks = was.source_id(), _key(was)[1:]
+        alike = (one for one in found if (one.source_id(), _key(one)[1:]) == looks)
         return next((one.hostname() for one in alike), None)
 
 
-def _key(info: "pylsl.StreamInfo") -> tuple[str, str, str]:
-    """Return what a stream is known again by when its program is started again."""
-    return info.source_id() or info.uid(), info.name(), info.type()
+def _key(info: "pylsl.StreamInfo") -> _Key:
+    source = info.source_id() or info.uid()
+    return source, info.name(), info.type(), info.channel_count(), info.channel_format()
+
+
+def _returned(was: _Key, now: _Key) -> str:
+    shape = f"{now[3]} channels instead of {was[3]}"
+    if now[3] == was[3]:
+        shape = "another format of its samples"
+    return f"came back with {shape}: it is recorded as a new stream from then on"
 
 
 def _health(recorded: _Recorded, now: float, rivals: list[str]) -> Health:

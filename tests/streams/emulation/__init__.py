@@ -89,10 +89,17 @@ class Lab:
         return self.start(str(HERE / "markers.py"))
 
     def sender(
-        self, name: str, kind: str, source_id: str, rate: float = 100.0, first: int = 0
+        self,
+        name: str,
+        kind: str,
+        source_id: str,
+        rate: float = 100.0,
+        first: int = 0,
+        channels: int = 2,
+        form: str = "float32",
     ) -> subprocess.Popen[str]:
         script = str(HERE / "sender.py")
-        return self.start(script, name, kind, source_id, str(rate), str(first))
+        return self.start(script, name, kind, source_id, str(rate), str(first), str(channels), form)
 
     def load(self) -> subprocess.Popen[str]:
         """Keep a core busy."""
