@@ -26,6 +26,7 @@ def correct(
     rate_hz: float = 0.0,
     latency_s: float = 0.0,
     evening: Literal["auto", "forbid", "force"] = "auto",
+    pauses: bool = False,
     end: float | None = None,
     own_clock: npt.ArrayLike | None = None,
 ) -> Corrected:
@@ -62,6 +63,9 @@ def correct(
     evening
         Whether timestamps of a regular stream are dejittered: only if they evidently scatter about
         a steady sample clock (``"auto"``), never, or always.
+    pauses
+        Whether the sampler is declared to pause: timestamps that are later from one sample on are
+        right then. Otherwise ``error`` includes the step.
     end
         When the recording ended, on the receiver's clock: shows that a source died before.
     own_clock
@@ -134,7 +138,9 @@ def correct(
                 "own_clock must be finite numbers of the shape (n, 2), the receiver's clock and "
                 f"one that nothing adjusts; they have the shape {own.shape}"
             )
-    treatment = Treatment(rate_hz=rate_hz, latency_s=latency_s, dejitter=EVENING[evening])
+    treatment = Treatment(
+        rate_hz=rate_hz, pauses=pauses, latency_s=latency_s, dejitter=EVENING[evening]
+    )
     return correct_raw(RawStream.of(taken, shown, came, index=index, own=own), treatment, end)
 
 

@@ -67,6 +67,11 @@ class StreamNeed(Settings):
     """Whether timestamps of a regular stream are dejittered: only where they demonstrably scatter
     about a steady sample clock, never, or always. The times before dejittering are kept as well."""
 
+    pauses: bool = False
+    """Whether its sampler pauses now and then, as an eye tracker does that stores its data.
+    Timestamps that are later from one sample on are then right. Otherwise they may be of a clock
+    that was set, and their uncertainty includes the step."""
+
     @model_validator(mode="after")
     def _names_a_stream(self) -> "StreamNeed":
         if self.type is None and self.name is None and self.source_id is None:
@@ -128,6 +133,7 @@ class StreamNeed(Settings):
         return Treatment(
             rate_hz=stated.rate_hz,
             can_drop_samples=stated.can_drop_samples,
+            pauses=self.pauses,
             dejitter=Dejitter.ENVELOPE if late else ways[self.evening],
             transport_s=self.min_delay_s or 0.0,
             latency_s=stated.latency_s if self.latency_s is None else self.latency_s,

@@ -182,3 +182,37 @@ def test_a_delay_that_changes_is_not_counted_as_lost_samples(seed: int) -> None:
         rate_hz=rate,
     )
     assert corrected.quality.dropped == 0
+
+
+@pytest.mark.parametrize("also", ["nothing else", "slower", "set back", "lost"])
+@pytest.mark.parametrize("seed", range(4))
+def test_pauses_that_are_declared_leave_no_doubt_about_right_stamps(seed: int, also: str) -> None:
+    """One pause of 60 to 240 ms made an exact eye tracker fail, with 110 to 228 ms stated."""
+    random = np.random.default_rng([5, seed, *also.encode()])
+    rate, seconds = float(random.choice([60.0, 120.0, 250.0, 500.0])), random.uniform(120.0, 300.0)
+    steps = np.full(int(rate * seconds), 1.0 / (rate * (1.0 + random.uniform(-5e-5, 5e-5))))
+    steps[random.integers(100, len(steps) - 100, int(random.integers(1, 4)))] += random.uniform(
+        0.03, 0.24
+    )
+    t, given = 1.0 + np.cumsum(steps), {}
+    if also == "lost":
+        t = np.delete(t, random.integers(100, len(t) - 100, int(random.integers(1, 10))))
+    clock, wrong = some_clock(random), np.zeros(len(t))
+    if also == "slower":
+        given["arrivals"] = pulled(random, t + slower_way(random, t / t[-1]))
+    elif also == "set back":
+        wrong = set_back(random, t, 0.02, 1)
+    given["probes"] = clock.probes(random, t[-1])
+    undeclared, declared = (
+        correct(clock(t) - wrong, rate_hz=rate, pauses=pauses, **given) for pauses in (False, True)
+    )
+    assert undeclared.quality.shifts > declared.quality.shifts == (also == "set back")
+    assert declared.quality.gaps > 0
+    for corrected in (undeclared, declared):
+        off = np.abs(corrected.time - t)
+        assert np.mean(off <= corrected.error) >= 0.99
+    if also == "set back":  # which side is right is as unknown as without pauses
+        assert np.median(declared.error) > 0.9 * wrong.max() - 1.0 / rate
+    elif also != "slower":  # a lag is a term of its own
+        assert np.quantile(declared.error, 0.99) < 1e-3
+    assert np.median(declared.error) <= np.median(undeclared.error)

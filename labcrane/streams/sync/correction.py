@@ -53,6 +53,8 @@ class Treatment:
         Nominal rate; 0 for irregular streams.
     can_drop_samples
         Whether the source may leave out samples, as cameras do.
+    pauses
+        Whether the sampler is declared to pause: stamps later from one sample on are then right.
     dejitter
         Whether timestamps are dejittered; markers never are, nor streams that may drop samples.
     transport_s
@@ -63,6 +65,7 @@ class Treatment:
 
     rate_hz: float = 0.0
     can_drop_samples: bool = False
+    pauses: bool = False
     dejitter: Dejitter = Dejitter.AUTO
     transport_s: float = 0.0
     latency_s: float = 0.0
@@ -222,16 +225,17 @@ def _correct(raw: RawStream, treatment: Treatment, end: float | None) -> Correct
         return Corrected(nothing, nothing, nothing, quality=Quality(**_trips(raw)))
     regular = treatment.rate_hz > 0.0
     placed = place(raw, epochs(raw, regular=regular), regular=regular)
-    sampled = _examined(raw, placed, regular=regular)
+    sampled = _examined(raw, placed, treatment)
     time, error = _evened(raw, placed, sampled, treatment)
     shift = treatment.transport_s + treatment.latency_s
     quality = _summed(raw, placed, sampled, (time, error, end), regular=regular)
     return Corrected(time - shift, error, placed.time - shift, placed.segments, quality)
 
 
-def _examined(raw: RawStream, placed: Placement, *, regular: bool) -> list[_Sampled]:
+def _examined(raw: RawStream, placed: Placement, treatment: Treatment) -> list[_Sampled]:
     """Return how each clock's samples were sampled, and their even times where these help."""
     arrival, times = raw.arrival(), placed.time
+    regular, pauses = treatment.rate_hz > 0.0, treatment.pauses
     if placed.long_frozen:  # frozen timestamps do not show how samples were taken
         own = moving(raw.stamps)
         times = np.interp(np.arange(len(times)), own, times[own])
@@ -246,7 +250,10 @@ def _examined(raw: RawStream, placed: Placement, *, regular: bool) -> list[_Samp
                 None if raw.index is None else raw.index[part],
             )
             probed = segment.basis is Basis.PROBES
-            sampling = examine(*seen, probed=probed) if regular else examine_irregular(*seen)
+            if regular:
+                sampling = examine(*seen, probed=probed, pauses=pauses)
+            else:
+                sampling = examine_irregular(*seen)
             followed = None
             if sampling.steady:
                 followed = _followed(times[part], sampling)

@@ -173,6 +173,7 @@ def examine(
     counter: FloatArray | None,
     *,
     probed: bool = True,
+    pauses: bool = False,
 ) -> Sampling:
     """Examine one clock's samples of a regular stream.
 
@@ -188,6 +189,8 @@ def examine(
         The source's own, unwrapped; None when it has none.
     probed
         Whether times rest on probes; those by arrivals scatter for another reason.
+    pauses
+        Whether the sampler is declared to pause.
     """
     index = np.arange(len(time), dtype=np.float64) if counter is None else counter
     stalls, longest = _stalls(time, arrival)
@@ -203,6 +206,8 @@ def examine(
         found = _steps(time[order], counts, grid, counted=counter is not None)
     else:
         found = _steps(time, index, grid, counted=counter is not None)
+    if pauses:
+        found = replace(found, shifted=found.shifted.without_pauses())
     grid = 0.0 if _on_grid(found, stamps[order], grid) else grid
     shifted = found.exact and len(found.shifted.at) > 0
     level, scattered = None, False
@@ -214,12 +219,12 @@ def examine(
             index = index + level.lost
         waited = receipt.find(time, index, explained=explained)
         if waited is not None:
-            pauses = np.diff(index) > 1.5  # noqa: PLR2004
+            longer = np.diff(index) > 1.5  # noqa: PLR2004
             return Sampling(
                 waited.period,
-                missing=int((np.diff(index)[pauses] - 1.0).sum()),
-                gaps=int(np.count_nonzero(pauses)),
-                longest_gap_s=float(np.diff(time)[pauses].max(initial=0.0)),
+                missing=int((np.diff(index)[longer] - 1.0).sum()),
+                gaps=int(np.count_nonzero(longer)),
+                longest_gap_s=float(np.diff(time)[longer].max(initial=0.0)),
                 noise_s=waited.spread_s,
                 late_stamps=True,
                 steady=True,

@@ -38,17 +38,27 @@ class Shifts:
     at: npt.NDArray[np.intp]
     by_s: FloatArray
 
+    def without_pauses(self) -> "Shifts":
+        """Return those to sooner: a sampler that is declared to pause shifts stamps to later."""
+        back = self.by_s < 0.0
+        return Shifts(self.at[back], self.by_s[back])
+
     def open_s(self, count: int) -> FloatArray:
         """Return by how much stamps may be off, before and behind each shift, shape ``(count,)``.
 
-        Which of its sides is right nothing tells. Shifts add up: those to later, which may be
-        pauses, to no more than a buffer holds.
+        Which of its sides is right nothing tells. Shifts of one direction add up: those to later,
+        which may be pauses, to no more than a buffer holds. A shift back may be none of them.
         """
-        by = np.zeros(count)
-        np.add.at(by, self.at, self.by_s)
-        level = np.cumsum(by)
-        most = max(MOST_S, -float(self.by_s[self.by_s < 0.0].sum()))
-        return np.asarray(np.minimum(np.maximum(level - level.min(), level.max() - level), most))
+        found = np.zeros(count)
+        for by_s, most in (
+            (np.maximum(self.by_s, 0.0), MOST_S),
+            (np.minimum(self.by_s, 0.0), np.inf),
+        ):
+            by = np.zeros(count)
+            np.add.at(by, self.at, np.abs(by_s))
+            level = np.cumsum(by)
+            found = np.maximum(found, np.minimum(np.maximum(level, level[-1] - level), most))
+        return found
 
 
 def find(
