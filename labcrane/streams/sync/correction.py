@@ -301,7 +301,7 @@ def _evened(
         if way is Dejitter.AUTO and followed is not None and segment.basis is Basis.PROBES:
             time[part], doubt = followed
             error[part] += doubt
-            if sampling.uncounted:
+            if sampling.unplaced or sampling.uncounted:
                 error[part] += sampling.noise_s / 2.0
             if sampling.received is not None or (sampling.late_stamps and not declared):
                 error[part] += sampling.noise_s

@@ -83,7 +83,9 @@ class Sampling:
     steady
         Whether evening helps: the scatter is the stamps', and the sample clock is steady.
     uncounted
-        Whether samples may be missing, and stamps scatter by too much to tell how many, or where.
+        Whether stamps scatter by so much that single lost samples cannot be counted.
+    unplaced
+        Whether samples may be missing among those stamped late, and nothing tells where.
     received
         How samples waited before they were stamped, or were taken: either may be; None where
         nothing shows that they did.
@@ -124,6 +126,7 @@ class Sampling:
     late_stamps: bool = False
     steady: bool = False
     uncounted: bool = False
+    unplaced: bool = False
     received: receipt.Receipt | None = None
     shifted: shifts.Shifts | None = None
     stalls: int = 0
@@ -162,7 +165,7 @@ class Sampling:
             return self
         kept = 0.0 if self.late_stamps else min(self.noise_s, self.reach_s)
         return replace(
-            self, noise_s=0.0, kept_s=kept, late_stamps=False, steady=False, uncounted=False
+            self, noise_s=0.0, kept_s=kept, late_stamps=False, steady=False, unplaced=False
         )
 
 
@@ -210,14 +213,17 @@ def examine(
         found = replace(found, shifted=found.shifted.without_pauses())
     grid = 0.0 if _on_grid(found, stamps[order], grid) else grid
     shifted = found.exact and len(found.shifted.at) > 0
-    level, scattered = None, False
+    level, blurred = None, False
     if probed and not disordered and not grid and not shifted:
         explained = found.computed and not found.missing and not found.clumped
-        scattered = counter is None and not found.exact and not found.computed
-        level = levels.find(time, found.period) if scattered else None
+        blurred = counter is None and (found.clumped or not (found.exact or found.computed))
+        if blurred:
+            find = levels.of_packets if found.clumped else levels.find
+            level = find(time, found.period)
+        sure = slice(None)
         if level is not None:
-            index = index + level.lost
-        waited = receipt.find(time, index, explained=explained)
+            index, sure = index + level.lost, level.unsure == 0.0
+        waited = receipt.find(time[sure], index[sure], explained=explained)
         if waited is not None:
             longer = np.diff(index) > 1.5  # noqa: PLR2004
             return Sampling(
@@ -233,13 +239,12 @@ def examine(
                 longest_stall_s=longest,
                 index=index,
                 unsure_s=0.0 if level is None else level.unsure * waited.period,
-                uncounted=scattered and level is None,
+                uncounted=blurred and level is None,
             )
     noise, late, by_grid, uneven = _noise(time, arrival, found, grid)
     rates = _rates(found)
     steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
-    uncounted = late and counter is None and (found.clumped or found.missing > 0)
-    uncounted |= scattered and level is None
+    unplaced = late and counter is None and (found.clumped or found.missing > 0)
     return Sampling(
         found.period,
         missing=found.missing if level is None else int(level.lost[-1]),
@@ -252,7 +257,8 @@ def examine(
         reach_s=_reach(found),
         late_stamps=late,
         steady=steady,
-        uncounted=uncounted,
+        uncounted=blurred and level is None,
+        unplaced=unplaced,
         shifted=found.shifted,
         stalls=stalls,
         longest_stall_s=longest,
