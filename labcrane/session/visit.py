@@ -2,9 +2,11 @@
 
 import os
 import shlex
+import socket
 import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -71,8 +73,13 @@ class Visit:
 
     @property
     def source(self) -> str:
-        """Which session this is, the same whenever it is resumed; its streams are named by it."""
-        return f"{self.study.protocol.study}/{self.folder.name}/ses-{self.session:02}"
+        """Which session this is, the same whenever it is resumed; its streams are named by it.
+
+        Studies and people of one name meet on a network: the last part is of where it is recorded.
+        """
+        where = f"{socket.gethostname()}:{self.folder.path.resolve()}"
+        session = f"{self.study.protocol.study}/{self.folder.name}/ses-{self.session:02}"
+        return f"{session}/{sha256(where.encode()).hexdigest()[:8]}"
 
     @property
     def journal(self) -> Path:
