@@ -1,5 +1,6 @@
 """The public names of this package, and the modules from which they are imported."""
 
+from . import directions
 from .actuator import ACTUATOR_PRESETS, Actuator, ActuatorSettings
 from .inverse_kinematics import reach
 from .jointed_body import Hinge, Segment, beside, segments, stands
@@ -37,6 +38,7 @@ __all__ = [
     "ShapeKind",
     "Surface",
     "beside",
+    "directions",
     "in_frame",
     "jacobian",
     "link_boxes",

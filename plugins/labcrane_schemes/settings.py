@@ -17,12 +17,7 @@ from labcrane.core import (
     Unit,
     Usual,
 )
-from labcrane_schemes.directions import (
-    doubted_joints,
-    doubted_ways,
-    of_joints,
-    of_the_tip,
-)
+from labcrane.machines import directions
 
 DIRECTIONS = {"base": ("x", "y", "z"), "arm": ("radial", "tangential", "vertical")}
 """Directions in which a stick moves the tip, for each ``frame``."""
@@ -83,10 +78,10 @@ class JointVelocitySettings(HandlingSettings):
     """Joint speed at full deflection, as a fraction of the machine's joint speeds."""
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
-        return {**super().doubts(machine), **doubted_joints(machine, self.map)}
+        return {**super().doubts(machine), **directions.doubted_joints(machine, self.map)}
 
     def directions(self, machine: Machine) -> Sequence[str]:
-        return of_joints(machine, self.map)
+        return directions.of_joints(machine, self.map)
 
 
 class EndEffectorSettings(HandlingSettings):
@@ -122,10 +117,10 @@ class EndEffectorSettings(HandlingSettings):
         return {"direction of the frame": DIRECTIONS[self.frame]}
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
-        return {**super().doubts(machine), **doubted_ways(self.map)}
+        return {**super().doubts(machine), **directions.doubted_ways(self.map)}
 
     def directions(self, machine: Machine) -> Sequence[str]:
-        return of_the_tip(self.map)
+        return directions.of_the_tip(self.map)
 
 
 class SwitchableSettings(Settings):

@@ -15,12 +15,16 @@ import pytest
 from cranes import needs_bullet, needs_mujoco
 from scheme_setups import LOW, MACHINES, STICKS, end_effector, joint_velocity, push, ready
 
+from labcrane.core.signals import Signal
 from labcrane.doctor.checks import directions
 from labcrane.machines.kinematics import jacobian
 from labcrane.protocol.questions import questions
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
+from labcrane.testing import make_run
+from labcrane_dmd.arm.settings import ValveSettings
+from labcrane_dmd.arm.valve import Valve
 from labcrane_schemes.end_effector import EndEffector
 from labcrane_schemes.joint_velocity import JointVelocity
 from labcrane_view.areas import Projection
@@ -172,6 +176,28 @@ def test_the_machine_goes_where_the_words_of_its_map_say(name: str, seed: int) -
             speeds = scheme.command(push(**{PUSHES[pushed]: 0.8}), state)[: len(machine.names)]
             velocity = jacobian(machine, state) @ speeds
             assert sign * velocity[along] > 0.01, sentence
+
+
+@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("seed", range(4))
+def test_the_machine_goes_where_the_words_of_its_valves_say(name: str, seed: int) -> None:
+    """A valve that extends lowered the boom by 2.31 m, and nothing asked about it."""
+    machine, dice = MACHINES[name], Random(seed)
+    turned = {joint: f"-valve.{joint}" for joint in machine.names if dice.random() < 0.5}
+    settings = ValveSettings(map=turned)
+    scheme = Valve(settings, machine)
+    run = make_run(machine, axes=[Signal("valve", "1", machine.names)])
+    scheme.open(run)
+    for sentence, joint in zip(settings.directions(machine), machine.names, strict=True):
+        given, goes = sentence.split(": ")
+        assert given == f"valve.{joint} extends"
+        along, sign = MOVES[goes.removeprefix(f"the {joint} ")]
+        pushed = np.zeros(run.axes.size)
+        pushed[run.axes.index(f"valve.{joint}")] = 0.8
+        speeds = scheme.command(pushed, LOW[name])[: len(machine.names)]
+        assert sign * (jacobian(machine, LOW[name]) @ speeds)[along] > 0.01, sentence
+    first = machine.joints[1].name
+    assert ("map" in settings.doubts(machine)) == (first not in turned)
 
 
 MAP = (

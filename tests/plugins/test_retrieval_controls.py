@@ -31,7 +31,7 @@ from labcrane_can.avc import State, encode
 
 RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
 JOINTS = ("base", "arm", "boom", "jaws")
-OWN = {"study", "title", "input", "operator", "scheme"}
+OWN = {"study", "title", "input", "operator", "scheme", "expected"}
 """What a variant may say otherwise; and its view's keys."""
 
 

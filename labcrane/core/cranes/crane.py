@@ -1,5 +1,6 @@
 """Crane whose joints follow speed commands: its signals, its drives and its visual shape."""
 
+import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 
@@ -15,7 +16,6 @@ from labcrane.machines.actuator import Actuator
 from labcrane.machines.crane_state import CraneState
 from labcrane.machines.links import link_boxes
 from labcrane.machines.machine import Body, Machine
-from labcrane.machines.pose import check_pose
 from labcrane.types import FloatArray
 
 ROUNDING_S = 1e-9
@@ -23,6 +23,10 @@ ROUNDING_S = 1e-9
 ENGINE_DEVIATION = 1e-9
 """Tolerance between angles and speeds of a compiled kernel and an engine's, in rad and rad/s: it
 rounds differently, by some 1e-14."""
+
+
+POSE_ROUNDING = 1e-9
+"""How far in rad a pose may lie outside the limits: degrees do not convert exactly."""
 
 
 def crane_signals(machine: Machine) -> tuple[Signal, ...]:
@@ -95,7 +99,7 @@ class Crane(Dynamics):
         return self._move(self._actuator.follow(command[self._drive].tolist()))
 
     def reset(self, pose: Sequence[float]) -> None:
-        angles = check_pose(self._machine, pose)
+        angles = _in_reach(self._machine, pose)
         self._actuator.reset()
         self._place(angles)
         self._state.fill(angles, [0.0] * len(angles))
@@ -176,3 +180,21 @@ class Crane(Dynamics):
     @abstractmethod
     def _move(self, speeds: Sequence[float]) -> FloatArray:
         """Move for one tick at ``speeds`` in rad/s; return the filled state."""
+
+
+def _in_reach(machine: Machine, pose: Sequence[float]) -> list[float]:
+    """Return ``pose`` in rad as plain floats, or raise :class:`ProtocolError`."""
+    angles = [float(angle) for angle in pose]
+    if len(angles) != len(machine.joints):
+        raise ProtocolError(
+            f"a pose of {len(angles)} angles was asked for; this machine has "
+            f"{len(machine.joints)} joints ({', '.join(machine.names)})"
+        )
+    for joint, angle in zip(machine.joints, angles, strict=True):
+        lowest, highest = joint.limits
+        if not lowest - POSE_ROUNDING <= angle <= highest + POSE_ROUNDING:
+            raise ProtocolError(
+                f"a pose with {joint.name} at {math.degrees(angle):.2f} degrees was asked for; "
+                f"it goes from {joint.range_deg[0]:g} to {joint.range_deg[1]:g}"
+            )
+    return angles

@@ -1,6 +1,6 @@
 """Settings of the arm and its valves."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationInfo, model_validator
@@ -16,6 +16,7 @@ from labcrane.core import (
     read_yaml,
     was_run,
 )
+from labcrane.machines import directions
 
 
 class ValveSettings(Settings):
@@ -31,6 +32,16 @@ class ValveSettings(Settings):
 
     def needs(self, machine: Machine) -> Names:
         return {"axis": [f"valve.{name}" for name in machine.names if name not in self.map]}
+
+    def axes(self, machine: Machine) -> Mapping[str, str]:
+        """Return the axis of each joint, in the machine's order."""
+        return {name: self.map.get(name, f"{directions.VALVE}{name}") for name in machine.names}
+
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        return directions.doubted_joints(machine, self.axes(machine))
+
+    def directions(self, machine: Machine) -> Sequence[str]:
+        return directions.of_joints(machine, self.axes(machine))
 
 
 class JawsSettings(Settings):

@@ -40,7 +40,7 @@ class Valve(Controller):
             Signal("command", "rad/s", machine.names),
             Signal("valve.signal", "1", machine.names),
         )
-        self._wanted = [settings.map.get(name, f"valve.{name}") for name in machine.names]
+        self._wanted = list(settings.axes(machine).values())
         self._machine = machine
         self._arm = Arm(machine)
         self._speeds = np.array(machine.speeds)

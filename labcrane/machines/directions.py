@@ -2,15 +2,18 @@
 
 A machine goes where the stick points: to the right turns right, a pull lifts or draws in, and the
 last link curls in to the left. So it is on excavators (ISO 10968, SAE J1177) and on cranes with
-two sticks.
+two sticks. A control panel's valve that extends lifts.
 """
 
 from collections.abc import Mapping
 
-from labcrane import Machine
+from labcrane.machines.machine import Machine
 
 STICKS = ("left.x", "left.y", "right.x", "right.y")
 """Axes of two sticks: x is positive to the right, y towards the operator."""
+
+VALVE = "valve."
+"""Axes of a control panel, one for each joint; positive signals extend."""
 
 WAYS = {
     "x": ("away from you", "towards you"),
@@ -53,11 +56,18 @@ def doubted_joints(machine: Machine, written: Mapping[str, str]) -> Mapping[str,
     usual = {(slew.name, "x"): -1.0, (first.name, "y"): -1.0}
     if last.a:  # else it carries nothing, and is a gripper
         usual[last.name, "x"] = -1.0
-    return {
+    found = {
         f"map.{joint}": _doubt(axis, _joint_goes(machine, joint, _sign(axis)))
         for joint, axis in written.items()
         if _is_unusual(joint, axis, usual)
     }
+    if written.get(first.name) == f"{VALVE}{first.name}":
+        found["map"] = (
+            f"leaves {first.name} to {VALVE}{first.name}, so that the "
+            f"{_joint_goes(machine, first.name, 1.0)} when its valve extends; where it lifts on "
+            f"your machine, write map: {{{first.name}: -{VALVE}{first.name}}}"
+        )
+    return found
 
 
 def doubted_ways(written: Mapping[str, str]) -> Mapping[str, str]:
@@ -91,6 +101,8 @@ def _pushed(axis: str) -> str:
     name = axis.removeprefix("-")
     side, _, way = name.partition(".")
     where = {"x": "to the right", "y": "towards you"}
+    if name.startswith(VALVE):
+        return f"{name} extends"
     return f"{side} stick {where[way]}" if name in STICKS else f"{name} forward"
 
 
