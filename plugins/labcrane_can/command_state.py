@@ -2,15 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from labcrane import ProtocolError
 from labcrane_can.avc import FULL, FrameError, State, decode
-from labcrane_can.dbc import FrameKey, described, key_of, of_any_source
+from labcrane_can.dbc import DescribedMessage, FrameKey, described, key_of, of_any_source
 from labcrane_can.settings import ValveMap
-
-if TYPE_CHECKING:
-    from cantools.database import Message
 
 NODE, PRIORITY_SHIFT = 0xFF, 26
 
@@ -57,27 +54,27 @@ class PanelCommands:
         self._node, self._priority = settings.node, settings.priority
         self._timeout = settings.timeout_s
         self._joints: dict[int, str] = {}
-        self._signals: dict[FrameKey, tuple[Message, dict[str, str]]] = {}
+        self._described: dict[FrameKey, DescribedMessage] = {}
         self._neutral, self._full = settings.neutral, settings.full
         self._broken: type[Exception] = FrameError
         if settings.map is None:
-            for joint, valve in settings.valves.items():
-                if int(valve) in self._joints:
+            for joint, valve in settings.numbers().items():
+                if valve in self._joints:
                     raise ProtocolError(
-                        f"joints {self._joints[int(valve)]!r} and {joint!r} have the same valve, "
+                        f"joints {self._joints[valve]!r} and {joint!r} have the same valve, "
                         f"{valve}; give each its own"
                     )
-                self._joints[int(valve)] = joint
+                self._joints[valve] = joint
         else:
             from cantools import Error  # noqa: PLC0415 - loads for a moment
 
-            self._signals, self._broken = described(settings), Error
+            self._described, self._broken = described(settings), Error
 
     def take(self, frame: CanFrame, time: float) -> None:
         """Take one frame that came at ``time`` in s."""
         if frame.is_error_frame:
             self.refuse("the bus reports an error frame")
-        elif self._signals:
+        elif self._described:
             self._take_described(frame, time)
         elif not frame.is_extended_id:
             self._pass_by(frame)
@@ -153,13 +150,13 @@ class PanelCommands:
 
     def _take_described(self, frame: CanFrame, time: float) -> None:
         identifier = frame.arbitration_id
-        found = self._signals.get(key_of(identifier, extended=frame.is_extended_id))
+        found = self._described.get(key_of(identifier, extended=frame.is_extended_id))
         if found is None and frame.is_extended_id:
-            found = self._signals.get(of_any_source(identifier))
+            found = self._described.get(of_any_source(identifier))
         if found is None or not self._ours(frame):
             self._pass_by(frame)
             return
-        message, joints = found
+        message = found.message
         if len(frame.data) < message.length:
             self.refuse(f"{message.name} has {len(frame.data)} bytes instead of {message.length}")
             return
@@ -170,21 +167,28 @@ class PanelCommands:
             # parts raise
             self.refuse(f"{message.name} cannot be decoded: {error}")
             return
-        for signal, joint in joints.items():
-            if signal in values:  # a multiplexed one is not in every frame
-                self._take_signal(f"{message.name}.{signal}", values[signal], joint, time)
+        for joint, signals in found.levers.items():
+            if all(signal in values for signal in signals):  # not every frame has multiplexed ones
+                given = {f"{message.name}.{signal}": values[signal] for signal in signals}
+                self._take_lever(given, joint, time)
 
-    def _take_signal(self, name: str, given: float, joint: str, time: float) -> None:
+    def _take_lever(self, given: dict[str, float], joint: str, time: float) -> None:
+        """Take a lever's value and, where that has no sign, its two sides."""
         asked = self.asked[joint]
-        value = (float(given) - self._neutral) / (self._full - self._neutral) * FULL
-        if not math.isfinite(value):
-            asked.wrong = f"{name} is {given}, which is not a number"
+        (name, value), *sides = given.items()
+        share = (float(value) - self._neutral) / (self._full - self._neutral)
+        least, side = (0.0, _side(sides)) if sides else (-1.0, 1)
+        if isinstance(side, str):
+            asked.wrong = side
+            self.refuse(side)
+        elif not math.isfinite(share):
+            asked.wrong = f"{name} is {value}, which is not a number"
             self.refuse(asked.wrong)
-        elif abs(value) > FULL * (1 + 1e-9):
-            least = 2 * self._neutral - self._full
-            self.refuse(f"{name} is {given}, beyond {least:g} to {self._full:g}")
+        elif not least - 1e-9 <= share <= 1.0 + 1e-9:
+            lowest = self._neutral + least * (self._full - self._neutral)
+            self.refuse(f"{name} is {value}, beyond {lowest:g} to {self._full:g}")
         else:
-            asked.signal, asked.floats, asked.time = float(round(value)), False, time
+            asked.signal, asked.floats, asked.time = float(round(side * share * FULL)), False, time
             asked.wrong = ""
 
     def _ours(self, frame: CanFrame) -> bool:
@@ -193,3 +197,18 @@ class PanelCommands:
         return (self._node is None or identifier & NODE == self._node) and (
             self._priority is None or priority == self._priority
         )
+
+
+def _side(sides: list[tuple[str, float]]) -> int | str:
+    """Return 1 or -1 for the side that a lever is moved to, 0 for rest; else what is wrong.
+
+    Of two bits, 0 is no and 1 is yes; 2 is an error and 3 not available (SAE J1939-71).
+    """
+    for name, state in sides:
+        if state not in {0, 1}:
+            said = {2: "an error", 3: "not available"}.get(int(state), "neither yes nor no")
+            return f"{name} is {state:g}, {said}"
+    (positive, is_positive), (negative, is_negative) = sides
+    if is_positive and is_negative:
+        return f"{positive} and {negative} are both 1"
+    return int(is_positive) - int(is_negative)

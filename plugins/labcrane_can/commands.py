@@ -16,7 +16,10 @@ def can(
     bus: Annotated[str, typer.Option(help="interface:channel, as slcan:/dev/ttyUSB0")],
     valve: Annotated[
         list[str] | None,
-        typer.Option(help="joint=number, or joint=Message.Signal with --map; once per joint"),
+        typer.Option(
+            help="joint=number, or joint=Message.Signal with --map, or its value and both sides, "
+            "joint=Message.Value,Message.Positive,Message.Negative; once per joint"
+        ),
     ] = None,
     map_: Annotated[
         Path | None,
@@ -58,13 +61,13 @@ def _said(error: "ErrorDetails") -> str:
     return f"{where}: {text}" if where else text
 
 
-def _valves(written: list[str], map_: Path | None) -> dict[str, int | str]:
+def _valves(written: list[str], map_: Path | None) -> dict[str, int | str | dict[str, str]]:
     """Return the valves as written; of a DBC file alone, every signal by its own name."""
     pairs = dict(each.split("=", 1) for each in written if "=" in each)
     if len(pairs) < len(written):
         raise typer.BadParameter("write joint=number: --valve boom=3", param_hint="--valve")
     if pairs:
-        return {joint: int(what) if what.isdigit() else what for joint, what in pairs.items()}
+        return {joint: _valve(what) for joint, what in pairs.items()}
     if map_ is None:
         raise typer.BadParameter(
             "say which valve moves which joint, as in --valve boom=3, or give a DBC file with "
@@ -74,3 +77,10 @@ def _valves(written: list[str], map_: Path | None) -> dict[str, int | str]:
     from labcrane_can.dbc import signal_names
 
     return dict(signal_names(map_))
+
+
+def _valve(written: str) -> int | str | dict[str, str]:
+    parts = written.split(",")
+    if len(parts) > 1:
+        return dict(zip(("value", "positive", "negative"), parts, strict=False))
+    return int(written) if written.isdigit() else written

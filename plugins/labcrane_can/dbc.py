@@ -1,6 +1,8 @@
 """Panels described by a DBC file."""
 
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +21,18 @@ SOURCE, ANY_SOURCE, GROUP = 0xFF, 0xFE, 0x03FFFF00
 
 FrameKey = tuple[str, int]
 """Key that identifies a message."""
+
+
+@dataclass(frozen=True, slots=True)
+class DescribedMessage:
+    """A message with levers in it: the names of their signals, by joint.
+
+    A lever has the signals of its value and, where that has no sign, of both its sides.
+    """
+
+    message: "Message"
+    levers: dict[str, tuple[str, ...]]
+
 
 GARBLED = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, RecursionError)
 
@@ -58,66 +72,89 @@ def every_signal(path: Path) -> tuple[str, ...]:
 
 
 def check_ranges(settings: ValveMap) -> None:
-    """Reject signals whose range in the DBC file is on one side of ``neutral`` only.
+    """Reject signals without a side whose range is on one side of ``neutral`` only.
 
     Raises
     ------
     ProtocolError
-        The range is on one side: a lever from 0 to 100 rests at 50, and with ``neutral: 0`` it
-        would command half of full flow at rest.
+        The range is on one side: a lever that rests at 128 of 255 would command half of full flow
+        at rest with ``neutral: 0``. What it is at rest, no range tells: another lever has the range
+        0 to 100 because its value has no sign.
     """
+    sided = {value for value, *sides in settings.levers().values() if sides}
     for name, signal in _used(settings):
-        least, most = signal.minimum, signal.maximum
-        if least is None or most is None or least < settings.neutral < most:
+        least, most = _range(signal)
+        if name in sided or least < settings.neutral < most:
             continue
         raise ProtocolError(
             f"{name} is {least:g} to {most:g} in {settings.map}, never on both sides of neutral, "
-            f"which is {settings.neutral:g}; give the value of the lever at rest, as in neutral: "
-            f"{(least + most) / 2:g}, and its value at full flow, full: {most:g}"
+            f"which is {settings.neutral:g}. Where it rests between its ends, give its values at "
+            "rest and at full flow, neutral and full, as the panel's manual has them. Where it has "
+            "no sign, name the signals of its sides: "
+            f"{{value: {name}, positive: Message.Signal, negative: Message.Signal}}"
         )
 
 
-def ranges(settings: ValveMap) -> dict[str, tuple[float, float]]:
-    """Return least and greatest value of each signal that is used; without those not stated."""
-    return {
-        name: (float(signal.minimum), float(signal.maximum))
-        for name, signal in _used(settings)
-        if signal.minimum is not None and signal.maximum is not None
-    }
+def stated_ranges(settings: ValveMap) -> dict[str, tuple[float, float]]:
+    """Return least and greatest value of each signal whose range the file states."""
+    return {name: _range(signal) for name, signal in _used(settings) if _states_a_range(signal)}
+
+
+def _states_a_range(signal: "Signal") -> bool:
+    return signal.minimum is not None and signal.maximum is not None
+
+
+def _range(signal: "Signal") -> tuple[float, float]:
+    """Return the least and the greatest value: as stated, else what its bits can hold.
+
+    Editors write ``[0|0]`` for a range that nobody has entered.
+    """
+    if signal.minimum is not None and signal.maximum is not None:
+        return float(signal.minimum), float(signal.maximum)
+    if signal.is_float:
+        return -math.inf, math.inf
+    half = 2 ** (signal.length - 1)
+    raw = (-half, half - 1) if signal.is_signed else (0, 2 * half - 1)
+    ends = [float(each * signal.scale + signal.offset) for each in raw]
+    return min(ends), max(ends)
 
 
 def _used(settings: ValveMap) -> "Iterator[tuple[str, Signal]]":
-    wanted = {str(name) for name in settings.valves.values()}
+    wanted = {value for value, *_ in settings.levers().values()}
     for message in _messages(settings.map):
         for signal in message.signals:
             if (name := f"{message.name}.{signal.name}") in wanted:
                 yield name, signal
 
 
-def described(settings: ValveMap) -> "dict[FrameKey, tuple[Message, dict[str, str]]]":
-    """Return, by key, the messages with valves in them, and which signal moves which joint.
+def described(settings: ValveMap) -> dict[FrameKey, DescribedMessage]:
+    """Return, by key, the messages with levers in them.
 
     Raises
     ------
     ProtocolError
-        The file cannot be read or has no such signal, signals of a message overlap, or a signal is
-        on one side of ``neutral`` only.
+        The file cannot be read or has no such signal, signals of a message overlap, those of a
+        lever are in two messages, or a signal is on one side of ``neutral`` only.
     """
     import cantools  # noqa: PLC0415 - loads for a moment
 
     check_ranges(settings)
     messages = {message.name: message for message in _messages(settings.map)}
-    found: dict[FrameKey, tuple[Message, dict[str, str]]] = {}
-    for joint, name in settings.valves.items():
-        message_name, _, signal = str(name).partition(".")
-        message = messages.get(message_name)
-        if message is None or signal not in {each.name for each in message.signals}:
-            known = ", ".join(
-                f"{each.name}.{one.name}" for each in messages.values() for one in each.signals
-            )
+    known = [f"{each.name}.{one.name}" for each in messages.values() for one in each.signals]
+    found: dict[FrameKey, DescribedMessage] = {}
+    for joint, names in settings.levers().items():
+        for name in names:
+            if name not in known:
+                raise ProtocolError(
+                    f"{settings.map} has no {name!r} for joint {joint!r}; it has {', '.join(known)}"
+                )
+        (message_name, *others) = {name.partition(".")[0]: None for name in names}
+        if others:
             raise ProtocolError(
-                f"{settings.map} has no {name!r} for joint {joint!r}; it has {known}"
+                f"{settings.map} has the value of the lever for joint {joint!r} in {message_name} "
+                f"and a side in {others[0]}; all of them must be in one message"
             )
+        message = messages[message_name]
         try:
             message.refresh(strict=True)
         except cantools.Error as error:
@@ -127,7 +164,8 @@ def described(settings: ValveMap) -> "dict[FrameKey, tuple[Message, dict[str, st
         key = key_of(message.frame_id, extended=message.is_extended_frame)
         if message.is_extended_frame and message.frame_id & SOURCE == ANY_SOURCE:
             key = of_any_source(message.frame_id)
-        found.setdefault(key, (message, {}))[1][signal] = joint
+        signals = tuple(name.partition(".")[2] for name in names)
+        found.setdefault(key, DescribedMessage(message, {})).levers[joint] = signals
     return found
 
 

@@ -72,7 +72,7 @@ class CanPanel(InputDevice):
         openings, speeds = state[self._opening].tolist(), state[self._speed].tolist()
         for joint, place in self._places.items():
             valve = self._settings.valves[joint]
-            if isinstance(valve, str):
+            if not isinstance(valve, int):
                 return  # a DBC map does not describe the messages that the panel expects
             node = self._settings.own_node
             estimated = PERCENT * openings[place] / FULL

@@ -36,12 +36,26 @@ DbcSignal = Annotated[str, Reference("signal of the map", own=True)]
 """Name of a message of the DBC file, and of a signal of it: ``Levers.Boom``."""
 
 
+class Lever(Settings):
+    """A lever whose value has no sign: signals of the same message give its side, as in J1939."""
+
+    value: DbcSignal
+    """How far it is moved: ``BJM1.X``."""
+
+    positive: DbcSignal
+    """The signal that is 1 while it is moved to the side where the valve extends, else 0."""
+
+    negative: DbcSignal
+    """The signal that is 1 while it is moved to the other side, else 0."""
+
+
 class ValveMap(Settings):
     """The assignment of valve commands to joints."""
 
-    valves: Annotated[dict[JointName, Valve | DbcSignal], Once()]
+    valves: Annotated[dict[JointName, Valve | DbcSignal | Lever], Once()]
     """For each joint, the number of its auxiliary valve; with ``map``, the names of message and
-    signal: ``Levers.Boom``."""
+    signal: ``Levers.Boom``. A J1939 joystick sends how far a lever is moved, and its side in
+    signals of their own: ``{value: BJM1.X, positive: BJM1.XRight, negative: BJM1.XLeft}``."""
 
     map: StudyPath | None = None
     """DBC file, for panels that do not send auxiliary valve commands."""
@@ -52,7 +66,8 @@ class ValveMap(Settings):
 
     full: float = 100.0
     """Value of a DBC signal at full flow, in the signal's own unit. The same distance on the other
-    side of ``neutral`` is full flow in the other direction."""
+    side of ``neutral`` is full flow in the other direction, unless a signal of its own gives the
+    side."""
 
     node: Node | None = None
     """Source address of the panel; any by default."""
@@ -84,16 +99,35 @@ class ValveMap(Settings):
     def doubts(self, machine: Machine) -> Mapping[str, str]:
         if self.map is None or not self.map.exists() or not find_spec("cantools"):
             return {}
-        from labcrane_can.dbc import ranges  # noqa: PLC0415 - loads for a moment
+        from labcrane_can.dbc import stated_ranges  # noqa: PLC0415 - loads for a moment
 
-        backwards = 2 * self.neutral - self.full
-        for name, (least, most) in ranges(self).items():
+        for name, (least, most) in stated_ranges(self).items():
+            backwards = self.backwards(name)
             said = f"is {self.full:g}, and {name} goes from {least:g} to {most:g}"
             if most > self.full or least < backwards:
                 return {"full": f"{said}: what is beyond {backwards:g} to {self.full:g} is refused"}
             if most < self.full or least > backwards:
                 return {"full": f"{said}, so that the valve is never fully open"}
         return {}
+
+    def numbers(self) -> dict[JointName, Valve]:
+        """Return the valve of each joint that has a number."""
+        return {joint: each for joint, each in self.valves.items() if isinstance(each, int)}
+
+    def levers(self) -> dict[JointName, tuple[DbcSignal, ...]]:
+        """Return the signals of each joint's lever: its value and, if it has any, its two sides."""
+        return {
+            joint: (each.value, each.positive, each.negative)
+            if isinstance(each, Lever)
+            else (each,)
+            for joint, each in self.valves.items()
+            if not isinstance(each, int)
+        }
+
+    def backwards(self, name: str) -> float:
+        """Return the least value of a DBC signal: full flow in the other direction, or rest."""
+        sided = any(value == name and sides for value, *sides in self.levers().values())
+        return self.neutral if sided else 2 * self.neutral - self.full
 
     @model_validator(mode="after")
     def _full_is_above_neutral(self) -> "ValveMap":
@@ -108,9 +142,10 @@ class ValveMap(Settings):
     @model_validator(mode="after")
     def _names_need_a_map(self) -> "ValveMap":
         for joint, valve in self.valves.items():
-            if isinstance(valve, str) and self.map is None:
+            if not isinstance(valve, int) and self.map is None:
+                named = valve.value if isinstance(valve, Lever) else valve
                 raise WrongKey(
-                    f"valves has {joint}: {valve!r}, which only a DBC file explains; give map, or "
+                    f"valves has {joint}: {named!r}, which only a DBC file explains; give map, or "
                     "the valve's number",
                     at=("valves", joint),
                 )

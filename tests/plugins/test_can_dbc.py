@@ -142,8 +142,9 @@ def test_a_signal_on_one_side_of_rest_is_refused_with_both_keys(
         levers(tmp_path / "uni.dbc", UNSIGNED, **given)
     assert str(told.value) == (
         f"Levers.Boom is 0 to 100 in {tmp_path / 'uni.dbc'}, never on both sides of neutral, which "
-        f"is {rest:g}; give the value of the lever at rest, as in neutral: 50, and its value at "
-        "full flow, full: 100"
+        f"is {rest:g}. Where it rests between its ends, give its values at rest and at full flow, "
+        "neutral and full, as the panel's manual has them. Where it has no sign, name the signals "
+        "of its sides: {value: Levers.Boom, positive: Message.Signal, negative: Message.Signal}"
     )
 
 
@@ -154,7 +155,7 @@ def test_a_check_refuses_a_lever_that_asks_for_half_flow_at_rest(panel: Path) ->
     text = path.read_text(encoding="utf-8")
     valves = "{base: Levers.Boom, arm: Levers.Arm}, map: panel.dbc"
     path.write_text(text.replace("{base: 1, arm: 2, boom: 3, jaws: 4}", valves), encoding="utf-8")
-    with pytest.raises(ProtocolError, match=r"Levers.Boom is 0 to 100 in .*, as in neutral: 50"):
+    with pytest.raises(ProtocolError, match=r"Levers.Boom is 0 to 100 in .*, never on both"):
         load(path, discover())
 
 
@@ -276,3 +277,85 @@ def test_options_that_cannot_be_are_refused_in_words(
     said = " ".join(capsys.readouterr().err.split())
     assert words in said
     assert "Traceback" not in said
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_lever_without_a_stated_range_that_rests_between_its_ends_is_refused(
+    tmp_path: Path, seed: int
+) -> None:
+    """Editors write [0|0]: a lever that rests at 128 gave half flow at rest, without a word."""
+    drawn = random.Random(seed)
+    length, scale = drawn.randrange(8, 17), drawn.choice([0.1, 0.4, 1.0])
+    signal = f' SG_ Boom : 0|{length}@1+ ({scale},0) [0|0] "%" P'
+    text = "\n".join([*LEVERS.splitlines()[:6], signal, ""])
+    most = scale * (2**length - 1)
+    with pytest.raises(ProtocolError, match=rf"Levers.Boom is 0 to {most:g} in .*, never on both"):
+        levers(tmp_path / "none.dbc", text)
+    assert levers(tmp_path / "none.dbc", text.replace("@1+", "@1-")).asked
+
+
+def bjm(position: float, right: int, left: int) -> bytes:
+    """Return a frame of a J1939 basic joystick: two states of two bits, position in 0.1 %."""
+    bits = left << 2 | right << 4 | round(position * 10) << 6
+    return bits.to_bytes(2, "little") + bytes([0xFF] * 6)
+
+
+JOYSTICK = (
+    'VERSION ""\nNS_ :\nBS_:\nBU_: J\n\nBO_ 2365445886 BJM1: 8 J\n'
+    ' SG_ XLeft : 2|2@1+ (1,0) [0|3] "" J\n SG_ XRight : 4|2@1+ (1,0) [0|3] "" J\n'
+    ' SG_ X : 6|10@1+ (0.1,0) [0|100] "%" J\n'
+)
+SIDED = {"value": "BJM1.X", "positive": "BJM1.XRight", "negative": "BJM1.XLeft"}
+
+
+def test_a_standard_joystick_moves_a_joint_to_the_side_that_it_is_moved_to(tmp_path: Path) -> None:
+    """Its position is a magnitude: the remedy "neutral: 50" drove each joint at full speed."""
+    (tmp_path / "bjm.dbc").write_text(JOYSTICK, encoding="utf-8")
+    with pytest.raises(ProtocolError, match="Where it has no sign, name the signals of its sides"):
+        PanelCommands(ValveMap(valves={"elbow": "BJM1.X"}, map=tmp_path / "bjm.dbc"))
+    commands = PanelCommands(ValveMap(valves={"elbow": SIDED}, map=tmp_path / "bjm.dbc"))
+    drawn = random.Random(7)
+    for number in range(2000):
+        position, side = drawn.uniform(0.0, 102.3), drawn.choice([(0, 0), (1, 0), (0, 1)])
+        if number % 3 == 0:
+            side = drawn.choice([(1, 1), (2, 0), (0, 2), (3, 3)])
+        frame = can.Message(arbitration_id=0x0CFDD6FE, data=bjm(position, *side))
+        before, was = commands.refused, commands.signals(0.0)[0]
+        commands.take(frame, 0.0)
+        now, (right, left) = commands.signals(0.0)[0], side
+        if number % 3 == 0:
+            assert now == [0.0]
+            assert commands.refused == before + 1
+            assert "BJM1.X" in (commands.silent(0.0) or "")
+        elif round(position * 10) > 1000:
+            assert now == was
+            assert commands.refused == before + 1
+        else:
+            assert now == [pytest.approx(2.5 * position * (right - left), abs=0.7)]
+
+
+def test_the_sides_of_a_lever_are_in_its_message(tmp_path: Path) -> None:
+    other = 'BO_ 256 Other: 1 J\n SG_ Side : 0|2@1+ (1,0) [0|3] "" J\n'
+    (tmp_path / "two.dbc").write_text(JOYSTICK + "\n" + other, encoding="utf-8")
+    valves = {"elbow": SIDED | {"negative": "Other.Side"}}
+    with pytest.raises(ProtocolError, match="and a side in Other; all of them must be in one"):
+        PanelCommands(ValveMap(valves=valves, map=tmp_path / "two.dbc"))
+
+
+def test_a_study_checks_the_signals_of_a_standard_joystick(panel: Path) -> None:
+    panel.write_text(JOYSTICK, encoding="utf-8")
+    shutil.copytree(PROTOCOLS / "retrieval", panel.parent, dirs_exist_ok=True)
+    path = panel.parent / "protocol.yaml"
+    text = path.read_text(encoding="utf-8")
+    written = "{value: BJM1.X, positive: BJM1.XRight, negative: BJM1.XLeft}"
+    valves = f"{{base: {written}}}, map: panel.dbc"
+    text = text.replace("{base: 1, arm: 2, boom: 3, jaws: 4}", valves)
+    text = text.replace("scheme: {use: valve,", "scheme: {use: valve, map: MAP,")
+    rest = "{arm: panel.connected, boom: float.base, jaws: panel.connected}"
+    path.write_text(text.replace("map: MAP", f"map: {rest}"), encoding="utf-8")
+    with pytest.raises(ProtocolError) as told:
+        load(path, discover())
+    assert "BJM1" not in str(told.value)
+    path.write_text(path.read_text("utf-8").replace("BJM1.XLeft", "BJM1.XLft"), encoding="utf-8")
+    with pytest.raises(ProtocolError, match=r"BJM1\.XLft.*did you mean 'BJM1.XLeft'"):
+        load(path, discover())
