@@ -44,7 +44,8 @@ class PresentedLimits(Settings):
 
     max_gap_s: PositiveFloat = 0.25
     """Longest time without a new picture, or with a sound that had failed, in seconds: about a
-    visual reaction time. A second without a picture is too little by `min_hz` in any case."""
+    visual reaction time. A second without a picture is too little by `min_hz` in any case. If the
+    session stalls for longer, the movement is interrupted."""
 
     def too_little(self, rate_hz: float, longest_s: float) -> bool:
         """Whether a rate in the worst second, or a time without a picture, is insufficient."""

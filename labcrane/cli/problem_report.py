@@ -42,7 +42,7 @@ EVENTS = frozenset(
         "break.start", "break.end", "pause.start", "pause.end", "plugin.slow", "input.lost",
         "input.back", "disk.lost", "disk.back", "stream.lost", "stream.back", "signal.bad",
         "signal.good", "feedback.awaited", "feedback.ready", "feedback.lost", "trigger.lost",
-        "trigger.flood", "trigger.back", "page.denied", "launcher.gone",
+        "trigger.flood", "trigger.back", "page.denied", "launcher.gone", "loop.stalled",
     ]
 )  # fmt: skip
 """Events of a session that go in; all others are only counted together."""

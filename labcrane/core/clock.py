@@ -73,6 +73,11 @@ class Tick(NamedTuple):
     due: float
     woke: float
 
+    @property
+    def late_s(self) -> float:
+        """Seconds from when the tick was due until the loop woke."""
+        return self.woke - self.due
+
 
 def ticks(clock: Clock, rate_hz: float) -> Iterator[Tick]:
     """Yield ticks at ``rate_hz`` for ever, the first one now."""

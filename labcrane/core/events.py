@@ -200,6 +200,8 @@ _ROWS = (
     _E("order.consent", 106, "consent is given out of place", _CONTROL),
     _E("order.denied", 107, "a page asks for an action that it may not order", _CONTROL),
     _E("order.take", 108, "the experimenter chooses a stream", _CONTROL),
+    _E("loop.stalled", 109, "the session stalled: it had no tick for a while, and missed some",
+       _CONTROL, "the session stalled for {seconds} s; the machine was held", "faults", "bad"),
     # Not markers: recorded beside the frames, or told to people alone.
     _E("session.standing", None, "how many trials were completed before",
        _STRUCTURE, "{done} trials were completed earlier"),

@@ -32,7 +32,7 @@ class Phase(StrEnum):
     SKIPPED = "skipped"  # by command
     REPEATED = "repeated"  # by command: the same trial follows as a new attempt
     ENDED = "ended"  # by command: the session ended in the middle of the trial
-    INTERRUPTED = "interrupted"  # the session's process died in the middle of the trial
+    INTERRUPTED = "interrupted"  # the session's process died or stalled in the middle of the trial
 
     over: bool
     """Whether the trial has ended."""

@@ -1,6 +1,6 @@
 """Practice: when its criterion is met."""
 
-from labcrane.core.records import Phase, Value
+from labcrane.core.records import UNDONE, Phase, Value
 from labcrane.design.plan import PlannedBlock
 
 
@@ -33,7 +33,7 @@ class WarmUp:
 
     def count(self, block: PlannedBlock, outcome: Phase) -> None:
         """Count a trial."""
-        if block.until is not None and outcome is not Phase.REPEATED:
+        if block.until is not None and outcome not in UNDONE:
             self.streak = self.streak + 1 if outcome is Phase.SUCCESS else 0
             self.over = self.over or self.streak >= block.until.successes
 

@@ -119,7 +119,8 @@ class OnFault(Section):
     cannot be started in the first place stops the session, unless it is set to continue without."""
 
     session_died: Literal["continue", "redo_trial", "redo_block"] = "redo_trial"
-    """The session's process died: where ``labcrane resume`` continues."""
+    """The session's process died: where ``labcrane resume`` continues. If it only stalled, for
+    longer than `presented.max_gap_s`, the trial is repeated, except with ``continue``."""
 
 
 class Protocol(Section):

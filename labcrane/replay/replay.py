@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane.core.clock import ManualClock, SystemClock, Tick
+from labcrane.core.clock import SystemClock, Tick
 from labcrane.core.records import Frame, Run
 from labcrane.design.plan import plan_session
 from labcrane.errors import ProtocolError, RecordingError
@@ -157,9 +157,8 @@ def _run(
             show = _Show(run, f"replay/{participant}/ses-{session:02}", speed)
             closing.callback(show.close)
             shown.append(show)
-        clock = ManualClock(start=script.start)
         with suppress(RecordOver):
-            loop.run(rig, run, sequencer, clock, script, log, (*sinks, *shown))
+            loop.run(rig, run, sequencer, script.clock, script, log, (*sinks, *shown))
     parts = (*parts, *log.unrecorded(record))
     return Replayed(log.ticks, parts, log.compare(record), log.frames())
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from labcrane.core.clock import Tick
+from labcrane.core.clock import ManualClock, Tick
 from labcrane.core.records import Event, Frame
 from labcrane.core.roles import InputDevice
 from labcrane.core.signals import Signal, signals_of
@@ -59,6 +59,19 @@ class RecordedAxes(InputDevice):
         return row
 
 
+class RecordedClock(ManualClock):
+    """A clock that jumps, and stalls where the recorded one has stalled the session."""
+
+    def __init__(self, start: float) -> None:
+        super().__init__(start)
+        self.stalls: dict[int, float] = {}
+        self._tick = -1
+
+    def wait_until(self, due: float) -> None:
+        self._tick += 1
+        super().wait_until(self.stalls.get(self._tick, due))
+
+
 class Script:
     """Everything that entered the loop from outside, tick by tick; also the console."""
 
@@ -67,7 +80,9 @@ class Script:
         axes = recorded.data.to_numpy(np.float64)
         self.input = RecordedAxes(signals_of(list(map(str, recorded.data)), recorded.units), axes)
         self.ticks = len(axes)
-        self.start = float(record.streams["loop"].data["due"].iloc[0])
+        loop = record.streams["loop"].data
+        self.clock = RecordedClock(float(loop["due"].iloc[0]))
+        self._woke = loop["woke"]
         self.disk_trouble: str | None = None
         self.awaited: set[str] = set()
         self._disk: dict[int, str | None] = {}
@@ -80,7 +95,9 @@ class Script:
     def _take(self, tick: int, name: str, data: Mapping[str, Any]) -> None:
         """Note the outside inputs that an event reports."""
         part, _, what = name.rpartition(".")
-        if part == "order":
+        if name == "loop.stalled":
+            self.clock.stalls[tick] = float(self._woke.iloc[tick])
+        elif part == "order":
             self._order(
                 tick,
                 Command(Order(what), data.get("text", ""), data.get("by", ""), data.get("at", "")),

@@ -34,7 +34,8 @@ def run(
     dt = 1.0 / run.rate_hz
     read, control, rest = rig.input.read, rig.controller.command, rig.controller.idle
     state, step = rig.dynamics.state, rig.dynamics.step
-    handle, evaluate, write = sequencer.handle, sequencer.evaluate, log.write
+    keep_time, handle, evaluate = sequencer.keep_time, sequencer.handle, sequencer.evaluate
+    write = log.write
     no_task = np.full(run.task.size, np.nan)
 
     frame = _before(rig, run)
@@ -42,6 +43,7 @@ def run(
     while True:
         tick = tick_of(clock, start, number, run.rate_hz)
         axes = read(tick, frame)
+        keep_time(tick, frame.tick)
         handle(console.commands(), rig.input.fault, log.trouble)
         command = control(axes, state()) if sequencer.moving else rest()
         frame = Frame(tick, 0.0, axes, command, step(command, dt), no_task)

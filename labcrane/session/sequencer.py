@@ -5,7 +5,9 @@ the frame that came of it.
 """
 
 from collections.abc import Generator, Iterable, Mapping, Sequence
+from math import inf
 
+from labcrane.core.clock import Tick
 from labcrane.core.records import Event, Frame, Phase, Trial, Value
 from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
 from labcrane.design.practice import WarmUp
@@ -45,7 +47,8 @@ Ticks = Generator[None, Frame, None]
 class Sequencer:
     """Leads a session through its plan.
 
-    The loop calls :meth:`handle` before the machine moves and :meth:`evaluate` after.
+    The loop calls :meth:`keep_time` and :meth:`handle` before the machine moves, and
+    :meth:`evaluate` after.
 
     Parameters
     ----------
@@ -89,6 +92,11 @@ class Sequencer:
         self._questionnaire: QuestionnaireRun | None = None
         self._wishes: set[Order] = set()  # to start, skip or repeat what runs now
         self._warm_up = WarmUp()
+        goes_on = study.protocol.on_fault.session_died == "continue"
+        self._redone = {Phase.REPEATED} if goes_on else {Phase.REPEATED, Phase.INTERRUPTED}
+        self._missed_until = -inf  # ticks that were due earlier were missed in a stall
+        self._behind = False
+        self._stalled = False  # in the movement under way
         self.over = False
         self._frame: Frame | None = None
         self._script = self._session()
@@ -107,14 +115,31 @@ class Sequencer:
     @property
     def moving(self) -> bool:
         """Whether the operator's command reaches the machine in this tick."""
-        return self._attempt is not None and not self._held.by
+        return self._attempt is not None and not self._at_rest
+
+    @property
+    def _at_rest(self) -> bool:
+        """Whether the machine is held at rest."""
+        return self._behind or bool(self._held.by)
 
     @property
     def going(self) -> TrialRun | None:
         """The trial under way, if its next tick is like the one before; None if something waits."""
         attempt = self._attempt
-        waits = self._notes or self._wishes or self._held.by or self._held.ending
+        waits = self._notes or self._wishes or self._at_rest or self._held.ending
         return None if waits or attempt is None or not attempt.ticks else attempt
+
+    def keep_time(self, tick: Tick, before: Tick) -> None:
+        """Hold the machine in ticks that a stall has missed, and interrupt the movement.
+
+        The operator saw nothing of them, and their axes are those of after the stall.
+        """
+        stall_s = tick.late_s - before.late_s
+        if stall_s > self._study.protocol.presented.max_gap_s:
+            self._note("loop.stalled", seconds=round(stall_s, 3))
+            self._stalled |= self.moving and self._attempt is not None and self._attempt.begun
+            self._missed_until = tick.woke
+        self._behind = tick.due < self._missed_until
 
     def handle(
         self, commands: Sequence[Message], lost_input: str | None, disk_trouble: str | None
@@ -130,7 +155,7 @@ class Sequencer:
 
     def evaluate(self, frame: Frame) -> None:
         """Complete ``frame``: trial, phase, the task's values, and everything that happened."""
-        frame.paused = bool(self._held.by)
+        frame.paused = self._at_rest
         frame.events = self._stamped(frame)
         self._frame = frame
         try:
@@ -266,6 +291,13 @@ class Sequencer:
         self._enter()
 
     def _trial(self, block: PlannedBlock, trial: Trial) -> Ticks:
+        while (yield from self._attempt_at(block, trial)) in self._redone:
+            trial = next_attempt(self._study, self._plan, trial)
+
+    def _attempt_at(self, block: PlannedBlock, trial: Trial) -> Generator[None, Frame, Phase]:
+        """Run one attempt, when no missed tick is left; return how it ended."""
+        while self._behind:
+            yield
         task = self._study.tasks[block.task]
         attempt = TrialRun(task, block, trial, self._rate_hz)
         self._keep_what_was()
@@ -282,8 +314,7 @@ class Sequencer:
         self._know("trial.end", attempt.row)
         if trial.planned.counted:
             self._warm_up.count(block, attempt.phase)
-        if attempt.phase is Phase.REPEATED:
-            yield from self._trial(block, next_attempt(self._study, self._plan, trial))
+        return attempt.phase
 
     def _keep_what_was(self) -> None:
         """Part the frame of this tick, not yet written, from arrays that a new trial resets."""
@@ -320,14 +351,15 @@ class Sequencer:
     def _wished_end(self) -> Phase | None:
         if self._held.ending:
             return Phase.ENDED
-        if not self._wishes:
-            return None
         if Order.SKIP in self._wishes:
             return Phase.SKIPPED
-        return Phase.REPEATED if Order.REPEAT in self._wishes else None
+        if Order.REPEAT in self._wishes:
+            return Phase.REPEATED
+        return Phase.INTERRUPTED if self._stalled else None
 
     def _enter(self, attempt: TrialRun | None = None) -> None:
         self._attempt = attempt
+        self._stalled = False
         self._wishes.clear()
 
     # Orders

@@ -51,6 +51,11 @@ class TrialRun:
         self._began: float | None = None
 
     @property
+    def begun(self) -> bool:
+        """Whether it has had a tick."""
+        return self._began is not None
+
+    @property
     def ticks(self) -> int:
         """Ticks so far, pauses left out."""
         return self._ticks
@@ -78,9 +83,8 @@ class TrialRun:
         """Complete ``frame``; ``wish`` ends the trial whatever the task thinks."""
         if self._began is None:
             self._began = frame.tick.due
-        lateness = frame.tick.woke - frame.tick.due
-        self._worst_s = max(self._worst_s, lateness)
-        self._late_ticks += lateness > self._period
+        self._worst_s = max(self._worst_s, frame.tick.late_s)
+        self._late_ticks += frame.tick.late_s > self._period
         frame.trial = self._trial.number
         frame.elapsed = self._ticks / self._rate_hz
         judgement = None

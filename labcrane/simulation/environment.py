@@ -217,6 +217,7 @@ class StudyEnvironment(gymnasium.Env[FloatArray, FloatArray]):
         rig, sequencer = session.rig, session.sequencer
         tick = next(session.ticks)
         axes = rig.input.read(tick, session.frame)
+        sequencer.keep_time(tick, session.frame.tick)
         sequencer.handle(orders, rig.input.fault, None)
         moves = sequencer.moving
         command = (

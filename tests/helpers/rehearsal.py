@@ -7,7 +7,7 @@ from pathlib import Path
 
 from simple_crane import CRANE
 
-from labcrane.core.clock import ManualClock
+from labcrane.core.clock import Clock, ManualClock
 from labcrane.core.records import Event, Frame, Run
 from labcrane.design.plan import plan_session
 from labcrane.protocol.rig import Rig
@@ -56,6 +56,19 @@ class ScriptedConsole:
 
     def report(self, event: Event) -> None:
         self.told.append(event)
+
+
+class StallingClock(ManualClock):
+    """A clock that goes on for some seconds before the loop wakes up for a tick, as in a hang."""
+
+    def __init__(self, stalls: Mapping[int, float], start: float = 1000.0) -> None:
+        super().__init__(start)
+        self._stalls = stalls
+        self._tick = -1
+
+    def wait_until(self, due: float) -> None:
+        self._tick += 1
+        super().wait_until(max(due, self.now()) + self._stalls.get(self._tick, 0.0))
 
 
 class DiesError(Exception):
@@ -112,8 +125,10 @@ def rehearse(
     waits: bool = False,
     awaits: Sequence[str] = (),
     rig: Rig | None = None,
+    clock: Clock | None = None,
 ) -> Rehearsal:
     """Run the first session of P001 and keep every frame."""
+    clock = clock or ManualClock(start=1000.0)
     plan = plan_session(study, "P001", 1)
     rig = rig or Rig.build(study, simulated=True)
     with rig.opened(study, plan.seed) as run:
@@ -121,5 +136,5 @@ def rehearse(
         seen = Rehearsal(run)
         console = ScriptedConsole(orders)
         keep = [lambda frame: seen.frames.append(copy.deepcopy(frame))]
-        loop.run(rig, run, sequencer, ManualClock(start=1000.0), console, NoLog(), keep)
+        loop.run(rig, run, sequencer, clock, console, NoLog(), keep)
     return seen
