@@ -16,7 +16,7 @@ from .rotation import rotation_matrix
 from .scene import Geom, PlacedObject, Scene, ShapeKind, load_scene, place_objects
 from .scene_codec import SCENE_PLACED, read_placed, write_placed
 from .scene_part import Part, load_part
-from .urdf import urdf_joint, urdf_link, urdf_of
+from .urdf import points_in_numbers, urdf_joint, urdf_link, urdf_of
 
 __all__ = [
     "ACTUATOR_PRESETS",
@@ -47,6 +47,7 @@ __all__ = [
     "load_part",
     "load_scene",
     "place_objects",
+    "points_in_numbers",
     "reach",
     "read_placed",
     "read_solids",

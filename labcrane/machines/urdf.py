@@ -5,13 +5,30 @@ the signs of motion in the same place. All frames are x along the link, y along 
 z up, so a pitch axis is +y (positive is down), and the DH offset turns the joint's origin.
 """
 
-from collections.abc import Iterable, Sequence
+import locale
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 
 from labcrane.machines.machine import Joint, Machine
 
 Vector = tuple[float, float, float]
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
+
+
+@contextmanager
+def points_in_numbers() -> Iterator[None]:
+    """Let an engine that reads numbers by the process's locale read points, not commas.
+
+    Bullet reads a mass of 0.9 kg as 0 where a plugin has set a locale that writes 0,9. The locale
+    is the whole process's for as long: only C offers one of a thread, and otherwise on each system.
+    """
+    before = locale.setlocale(locale.LC_NUMERIC)
+    locale.setlocale(locale.LC_NUMERIC, "C")
+    try:
+        yield
+    finally:
+        locale.setlocale(locale.LC_NUMERIC, before)
 
 
 def urdf_of(machine: Machine, *, solid: bool = False, beyond: Iterable[str] = ()) -> str:

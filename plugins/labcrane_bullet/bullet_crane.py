@@ -8,7 +8,7 @@ from pathlib import Path
 
 from labcrane import FloatArray, Machine, PluginError, Run
 from labcrane.core import Crane, CraneSettings, Kernel, Value
-from labcrane.machines import GRAVITY, urdf_of
+from labcrane.machines import GRAVITY, points_in_numbers, urdf_of
 from labcrane_bullet.engine import pybullet
 
 ITERATIONS = 400
@@ -101,12 +101,13 @@ class BulletCrane(Crane):
             physicsClientId=client,
         )
         pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
-        body = pybullet.loadURDF(
-            str(self._file),
-            useFixedBase=True,
-            flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
-            physicsClientId=client,
-        )
+        with points_in_numbers():
+            body = pybullet.loadURDF(
+                str(self._file),
+                useFixedBase=True,
+                flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+                physicsClientId=client,
+            )
         self._body = body
         for joint, angle in zip(self._joints, angles, strict=True):
             _prepare(body, joint, client)

@@ -130,6 +130,10 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
     "terminals": (lambda: find_spec("pty") is not None, "Windows has no pseudo-terminals"),
     "limits of files": (lambda: find_spec("resource") is not None, "Windows has none"),
     "permissions": (lambda: sys.platform != "win32", "Windows has access lists instead"),
+    "locales": (
+        lambda: bool(shutil.which("localedef")) and Path("/usr/share/i18n/locales/de_DE").is_file(),
+        "apt install locales",
+    ),
     "Linux": (lambda: sys.platform == "linux", "it is about Linux's own calls"),
     "root": (lambda: os.geteuid() == 0, "only root may ask what a firewall would do"),
     "pybullet": (lambda: find_spec("pybullet") is not None, "Python 3.11: it has no later wheels"),

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from labcrane import ProtocolError
-from labcrane.machines import Geom, PlacedObject, ShapeKind, beside, stands
+from labcrane.machines import Geom, PlacedObject, ShapeKind, beside, points_in_numbers, stands
 from labcrane_dmd.arm.engine import pybullet
 from labcrane_dmd.arm.ragdoll import ragdoll
 
@@ -99,7 +99,7 @@ def _add_jointed(placed: PlacedObject, client: int) -> StandingBody:
     """Put a jointed figure into the engine, with friction in its hinges and stops at their ends."""
     doll = ragdoll(placed)
     at, yaw = stands(placed, placed.parts[0])
-    with tempfile.TemporaryDirectory(prefix="labcrane-") as folder:
+    with tempfile.TemporaryDirectory(prefix="labcrane-") as folder, points_in_numbers():
         path = Path(folder) / "figure.urdf"
         path.write_text(doll.urdf, encoding="utf-8")
         body = pybullet.loadURDF(

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from labcrane import Machine, PluginError
-from labcrane.machines import GRAVITY, PlacedObject
+from labcrane.machines import GRAVITY, PlacedObject, points_in_numbers
 from labcrane_dmd.arm.contacts import Contacts
 from labcrane_dmd.arm.engine import pybullet
 from labcrane_dmd.arm.grip import Grip
@@ -189,7 +189,7 @@ def _engine(dt: float, iterations: int) -> int:
 
 
 def _load(machine: Machine, settings: ArmSettings, client: int) -> int:
-    with tempfile.TemporaryDirectory(prefix="labcrane-") as folder:
+    with tempfile.TemporaryDirectory(prefix="labcrane-") as folder, points_in_numbers():
         path = Path(folder) / "arm.urdf"
         path.write_text(urdf_of(machine, settings.jaws), encoding="utf-8")
         arm: int = pybullet.loadURDF(
