@@ -1,6 +1,6 @@
 """The public names of this package, and the modules from which they are imported."""
 
-from .codebook import codebook_of
+from .codebook import codebook_of, levels_of
 from .cohort import Participant, find_cohort
 from .electrodes.mne import (
     EEG_READERS,
@@ -45,6 +45,7 @@ __all__ = [
     "fixations_of",
     "gaze_space",
     "glass_of",
+    "levels_of",
     "measures_of",
     "movements_of",
     "open_dataset",

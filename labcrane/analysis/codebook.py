@@ -9,6 +9,7 @@ from labcrane.analysis.presented import PRESENTED
 from labcrane.analysis.questionnaires import ANSWERS, MEANING, SCORES, asked_in, score_column
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.core.items import Item
+from labcrane.files.yaml import parse_yaml
 from labcrane.recording.frame_log import LOOP
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.recording.trial_columns import OWN
@@ -51,6 +52,27 @@ def codebook_of(participant: Participant, measures: "pd.DataFrame") -> "pd.DataF
         *map(stream_codebook, sessions),
     ]
     return pd.concat(tables).drop_duplicates(["table", "column"], ignore_index=True)
+
+
+def levels_of(participant: Participant) -> dict[str, tuple[str, ...]]:
+    """Return the planned levels of columns of the trial table, in the protocol's order.
+
+    Of groups, conditions, and questions with choices.
+    """
+    context = participant.context
+    text = str(context.get("protocol", ""))
+    protocol = parse_yaml(text, "the recorded protocol", recorded=True)
+    design = (protocol.get("design") if isinstance(protocol, Mapping) else None) or {}
+    found = {
+        column: tuple(map(str, design[key]))
+        for column, key in (("group", "groups"), ("condition", "conditions"))
+        if design.get(key)
+    }
+    for name, about in context.get("questionnaires", {}).items():
+        for item in about["items"]:
+            if item.get("choices"):
+                found[f"{name}.{item['name']}"] = tuple(map(str, item["choices"]))
+    return found
 
 
 def trial_codebook(
@@ -159,6 +181,8 @@ def stream_codebook(session: SessionRecord) -> "pd.DataFrame":
     for name, stream in session.streams.items():
         source = "another program's stream" if "corrected" in stream.attrs else WRITTEN
         rows.append((name, "time", "s", "time on the session's clock", source))
+        if "corrected" in stream.attrs:
+            rows.append((name, "time_raw", "s", "time on the stream's own clock", source))
         rows += [
             (name, column, unit, told.get(f"{name}.{column}") or column.replace(".", " "), source)
             for column, unit in stream.units.items()

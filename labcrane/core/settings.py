@@ -15,7 +15,8 @@ from labcrane.files.model import AtMost as AtMost  # noqa: PLC0414 - public here
 from labcrane.files.model import StrictModel
 from labcrane.files.model import Usual as Usual  # noqa: PLC0414
 from labcrane.files.model import was_run as was_run  # noqa: PLC0414
-from labcrane.files.names import outside as outside  # noqa: PLC0414 - public here
+from labcrane.files.names import file_name_of as file_name_of  # noqa: PLC0414 - public here
+from labcrane.files.names import outside as outside  # noqa: PLC0414
 from labcrane.files.table import read_csv_text as read_csv_text  # noqa: PLC0414 - public here
 from labcrane.files.units import Unit as Unit  # noqa: PLC0414 - public here
 from labcrane.files.yaml import YamlFile

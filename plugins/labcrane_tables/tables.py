@@ -16,7 +16,6 @@ from labcrane.analysis import (
     annotations_of,
     answers_of,
     beside_trials,
-    codebook_of,
     events_of,
     fixations_of,
     measures_of,
@@ -24,12 +23,15 @@ from labcrane.analysis import (
     scores_of,
     with_unseen_areas,
 )
+from labcrane.core import file_name_of
 from labcrane.recording import SessionRecord, labelled
-from labcrane_tables.frames import Names, StreamTable, snake_case, stream_tables
+from labcrane_tables.codebook import Codebook
+from labcrane_tables.frames import Names, StreamTable, stream_tables
 from labcrane_tables.settings import TableSettings
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
 READER = "read.R"
 GZIP_LEVEL = 1  # 9 takes eight times as long and saves a fifth
@@ -47,7 +49,7 @@ class Tables(Exporter):
     ``scores``           one row per score of a questionnaire
     ``fixations``        one row per point at which the eye tracker was checked, where it was
     ``streams/``         one file per participant, session and stream, one row per tick
-    ``codebook.csv``     unit, meaning and source of every column
+    ``codebook.csv``     unit, meaning, source, type and planned levels of every column
     ===================  ==============================================================
     """
 
@@ -60,51 +62,60 @@ class Tables(Exporter):
         import pandas as pd
 
         (folder / "streams").mkdir()
-        people, trials, codebooks, answers, scores = [], [], [], [], []
-        marks, looked_at = [], []
+        people, trials, answers, scores, marks, looked_at = [], [], [], [], [], []
         names = Names()
+        book = Codebook(names)
         events = _Growing(folder / "events")
         for participant in participants:
             people.append(_person(participant))
             measures = beside_trials(measures_of(participant), participant)
             trials.append(names.table(measures))
-            codebooks.append(codebook_of(participant, measures))
+            book.add(participant, measures)
             answers.append(answers_of(participant))
             marks.append(annotations_of(participant))
             looked_at.append(fixations_of(participant))
             scores.append(scores_of(participant))
             for number, session in participant.sessions():
                 events.add(_events(participant, number, session))
-                self._streams(participant, number, session, folder / "streams")
-        events.close()
+                self._streams(participant, number, session, folder / "streams", book)
+        book.has("events", events.close())
         for name, tables in (("annotations", marks), ("fixations", looked_at)):
             if any(map(len, tables)):
-                write_csv(joined(tables), folder / f"{name}.csv")
+                book.has(name, write_csv(joined(tables), folder / f"{name}.csv"))
         seen = with_unseen_areas(joined(trials))
-        for name, tables in (("trials", [seen]), ("questionnaires", answers), ("scores", scores)):
+        for name, tables in (
+            ("trials", [seen]),
+            ("questionnaires", answers),
+            ("scores", scores),
+            ("participants", [pd.DataFrame(people)]),
+        ):
             everything = joined(tables)
-            write_csv(everything, folder / f"{name}.csv")
+            book.has(name, write_csv(everything, folder / f"{name}.csv"))
             everything.to_parquet(folder / f"{name}.parquet", index=False)
-        write_csv(pd.DataFrame(people), folder / "participants.csv")
-        write_csv(_codebook(codebooks, names), folder / "codebook.csv")
+        write_csv(book.table(), folder / "codebook.csv")
         copyfile(Path(__file__).with_name(READER), folder / READER)
 
     def _streams(
-        self, participant: Participant, number: int, session: SessionRecord, folder: Path
+        self,
+        participant: Participant,
+        number: int,
+        session: SessionRecord,
+        folder: Path,
+        book: Codebook,
     ) -> None:
         forms = self._settings.streams
         if forms == "none":
             return
         for table in stream_tables(session):
-            stem = f"{participant.name}_ses-{number:02}_{table.name.replace('/', '-')}"
+            stem = f"{participant.name}_ses-{number:02}_{file_name_of(table.name)}"
             if forms in {"both", "parquet"}:
-                write_parquet(table, folder / f"{stem}.parquet")
+                book.has(table.name, write_parquet(table, folder / f"{stem}.parquet"))
             if forms in {"both", "csv"}:
-                _write_packed_csv(table, folder / f"{stem}.csv.gz")
+                book.has(table.name, _write_packed_csv(table, folder / f"{stem}.csv.gz"))
 
 
-def write_parquet(table: StreamTable, path: Path) -> None:
-    """Write a table a row group at a time."""
+def write_parquet(table: StreamTable, path: Path) -> "pa.Schema":
+    """Write a table a row group at a time; return its columns."""
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -114,9 +125,10 @@ def write_parquet(table: StreamTable, path: Path) -> None:
         for batch in chain([first], batches):
             # write_batch would gather a million rows, some hundred megabytes, before it writes any.
             out.write_table(pa.Table.from_batches([batch]))
+    return first.schema
 
 
-def _write_packed_csv(table: StreamTable, path: Path) -> None:
+def _write_packed_csv(table: StreamTable, path: Path) -> "pa.Schema":
     from pyarrow import csv
 
     batches = table.batches()
@@ -125,6 +137,7 @@ def _write_packed_csv(table: StreamTable, path: Path) -> None:
         rows.write_batch(first)
         for batch in batches:
             rows.write_batch(batch)
+    return first.schema
 
 
 @contextmanager
@@ -176,13 +189,21 @@ class _Growing:
         self._writer.write_table(rows)
         table.to_csv(self._csv, mode="a", header=not self._csv.exists(), index=False)
 
-    def close(self) -> None:
-        if self._writer is not None:
-            self._writer.close()
+    def close(self) -> "pa.Schema":
+        """Close the files; return their columns, none if nothing was added."""
+        import pyarrow as pa
+
+        if self._writer is None:
+            return pa.schema([])
+        self._writer.close()
+        return self._writer.schema
 
 
-def write_csv(table: "pd.DataFrame", path: Path) -> None:
-    """Write a table as CSV, compressed when the name ends in .gz; what is missing is empty."""
+def write_csv(table: "pd.DataFrame", path: Path) -> "pa.Schema":
+    """Write a table as CSV, compressed when the name ends in .gz; return its columns.
+
+    What is missing is empty.
+    """
     import pyarrow as pa
     from pyarrow import csv
 
@@ -192,6 +213,7 @@ def write_csv(table: "pd.DataFrame", path: Path) -> None:
             csv.write_csv(rows, out)
     else:
         csv.write_csv(rows, path)
+    return rows.schema
 
 
 def _person(participant: Participant) -> dict[str, object]:
@@ -225,22 +247,3 @@ def _events(participant: Participant, number: int, session: SessionRecord) -> "p
     events.insert(0, "participant", participant.name)
     events.insert(1, "session", number)
     return events
-
-
-def _codebook(codebooks: "list[pd.DataFrame]", names: Names) -> "pd.DataFrame":
-    """Join the participants' codebooks; columns are called as the tables call them."""
-    import pandas as pd
-
-    book = pd.concat(codebooks).drop_duplicates(["table", "column"])
-    groups = ("loop", "input", "command", "state", "task")
-    called = []
-    for table, column in zip(book["table"], book["column"], strict=True):
-        if table == "trials":
-            called.append(names.of(column))
-        elif table in groups and column != "time":
-            called.append(snake_case(f"{table}.{column}"))
-        else:
-            called.append(snake_case(column))
-    book = book.assign(column=called)
-    book["table"] = book["table"].where(~book["table"].isin(groups), "frames")
-    return book.drop_duplicates(["table", "column"], ignore_index=True)

@@ -204,5 +204,5 @@ def test_octave_reads_an_amended_study_and_warns(exports: Path) -> None:
 def test_r_reads_an_amended_study(exports: Path) -> None:
     script = """argument <- commandArgs(TRUE); source(file.path(argument, "read.R"))
     study <- suppressWarnings(read_labcrane(argument))
-    cat(sort(unique(na.omit(study$trials$heat_felt))))"""
+    cat(sort(unique(na.omit(as.character(study$trials$heat_felt)))))"""
     assert r(script, exports / "tables").split()[-3:] == ["4", "cold", "warm"]

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.cohort import Cohort, find_cohort
 from labcrane.analysis.measures import MeasuredParticipant, measures_of
 from labcrane.core.records import Event
 from labcrane.recording.labels import Labels
@@ -17,6 +18,7 @@ from labcrane_tables.psychds import PsychDs
 from labcrane_tables.settings import PsychDsSettings, TableSettings
 from labcrane_tables.tables import Tables
 from results.consumers import needs_r, r, table, under
+from results.recorded import record, study
 
 
 @pytest.fixture(scope="module")
@@ -185,3 +187,21 @@ def test_psych_ds_describes_every_column_of_every_file(cohort: Cohort, tmp_path:
         assert set(header) == set(described)
         assert len(rows) == 8
     assert described["movement_time"]["unitText"] == "s"
+
+
+@pytest.mark.slow
+def test_files_of_streams_have_names_that_every_disk_takes(tmp_path: Path) -> None:
+    """Each name is of another program, and Windows takes none of them as it is."""
+    streams = ["EEG: rig 1", "a<b>c|d", 'what? "x*y"', "back\\slash", "con"]
+    record(study(tmp_path), tmp_path / "data", "P001", others=streams)
+    people = find_cohort(tmp_path / "data").included
+    out = tmp_path / "out"
+    out.mkdir()
+    Tables(TableSettings(streams="csv")).export(iter(people), out)
+    names = {path.name.removesuffix(".csv.gz") for path in (out / "streams").iterdir()}
+    assert all(re.fullmatch(r"P001_ses-01_[A-Za-z0-9_.-]+", name) for name in names)
+    assert len(names) == len(streams) + 1
+    book = pd.read_csv(out / "codebook.csv", keep_default_na=False)
+    for stream in streams:
+        (name,) = set(book["table"][book["source"].str.endswith(f" '{stream}'")])
+        assert f"P001_ses-01_{name}" in names
