@@ -31,7 +31,7 @@ from labcrane.approval.environment import (
 from labcrane.approval.lock import lock_path, read_lock
 from labcrane.approval.materials import files_of_settings, study_files
 from labcrane.errors import ProtocolError
-from labcrane.files.atomic import UNFINISHED, copy, sha256, write_text
+from labcrane.files.atomic import UNFINISHED, copy, give_name, sha256, write_text
 from labcrane.files.yaml import YamlFile
 from labcrane.protocol.study import Study
 from labcrane.registry.entry_points import one_name
@@ -81,7 +81,7 @@ def bundle(study: Study, registry: Registry, folder: Path) -> Bundle:
     unfinished.mkdir(parents=True)
     try:
         packages = _fill(unfinished, study, files)
-        unfinished.rename(folder)
+        give_name(unfinished, folder)
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file()) / 1e6

@@ -3,6 +3,7 @@
 import hashlib
 import os
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -18,6 +19,37 @@ SHARED_FILE = 0o644
 
 UNFINISHED = ".unfinished"
 """End of the name of a file that is being written next to the one it will replace."""
+
+
+PATIENCE_S = 2.0
+"""Windows refuses to rename what another program has open: a virus scanner, OneDrive, for a
+moment. How long it is tried again, in seconds."""
+
+LOOK_S = 0.05
+
+IN_USE = (5, 32, 33)
+"""How Windows refuses it: access denied, sharing violation, lock violation."""
+
+
+def give_name(source: Path, target: Path) -> None:
+    """Give a file or folder its name; a file with that name is replaced.
+
+    Raises
+    ------
+    OSError
+        The system refuses, on Windows for two seconds if the reason may pass.
+    """
+    give = source.rename if source.is_dir() else source.replace
+    deadline = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            give(target)
+        except OSError as error:
+            if getattr(error, "winerror", None) not in IN_USE or time.monotonic() >= deadline:
+                raise
+            time.sleep(LOOK_S)
+        else:
+            return
 
 
 def write_text(path: Path, text: str, mode: int = PRIVATE_FILE) -> None:
@@ -52,7 +84,7 @@ def replacing(path: Path, mode: int = PRIVATE_FILE) -> Iterator[Path]:
         with beside.open("r+b") as file:  # Windows syncs only what may be written
             os.fsync(file.fileno())
         beside.chmod(mode)
-        beside.replace(path)
+        give_name(beside, path)
     except OSError as error:
         raise StorageError(
             f"cannot write {path}: {error.strerror or error}; it is unchanged: remove the cause, "

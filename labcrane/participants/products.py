@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from labcrane.errors import ProtocolError
-from labcrane.files.atomic import UNFINISHED, make_folder, sync_folder
+from labcrane.files.atomic import UNFINISHED, give_name, make_folder, sync_folder
 from labcrane.files.lock import held
 from labcrane.files.names import file_name_of
 from labcrane.participants.copies import MANIFEST, enter, kept_folder
@@ -245,7 +245,7 @@ def _put(staging: Path, target: Path) -> None:
         if path.is_dir() and not path.is_symlink():
             make_folder(place)
         else:
-            path.replace(place)
+            give_name(path, place)
     sync_folder(target)
 
 

@@ -7,7 +7,7 @@ from datetime import date
 from pathlib import Path
 
 from labcrane.errors import ProtocolError
-from labcrane.files.atomic import copy, make_folder, replacing, sync_folder, write_text
+from labcrane.files.atomic import copy, give_name, make_folder, replacing, sync_folder, write_text
 from labcrane.files.names import check_name
 from labcrane.participants.copies import (
     Reach,
@@ -121,7 +121,7 @@ def _relabel_folder(source: Path, target: Path, old: str, new: str) -> None:
         make_folder(beside)
         _relabel_files(source, beside, old, new)
         sync_folder(beside)
-        beside.rename(target)
+        give_name(beside, target)
         sync_folder(target.parent)
     shutil.rmtree(source)
 

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from labcrane.errors import RecordingError
-from labcrane.files.atomic import PRIVATE_FILE
+from labcrane.files.atomic import PRIVATE_FILE, give_name
 from labcrane.files.system import BINARY
 
 SHIFT = 16
@@ -133,7 +133,7 @@ def clear(path: Path) -> None:
     A link is removed, never its target; a folder, which labcrane never writes, is moved aside.
     """
     if path.is_dir() and not path.is_symlink():
-        path.rename(path.with_name(f"{path.name}.{os.getpid()}.aside"))
+        give_name(path, path.with_name(f"{path.name}.{os.getpid()}.aside"))
     else:
         path.unlink(missing_ok=True)
 

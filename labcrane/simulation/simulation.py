@@ -22,7 +22,7 @@ from labcrane.core.garbage import cleared
 from labcrane.core.records import Event, Run, Value
 from labcrane.design.plan import plan_session
 from labcrane.errors import ProtocolError, RecordingError
-from labcrane.files.atomic import make_folder, write_text
+from labcrane.files.atomic import give_name, make_folder, write_text
 from labcrane.files.lock import alone_in
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study, load
@@ -159,7 +159,7 @@ def simulate_trials(order: SimulationJob) -> "pd.DataFrame":
     make_folder(order.data)
     with tempfile.TemporaryDirectory(dir=order.data, prefix=UNFINISHED) as scratch:
         table.to_parquet(Path(scratch) / path.name)
-        (Path(scratch) / path.name).replace(path)
+        give_name(Path(scratch) / path.name, path)
     return table
 
 
@@ -223,7 +223,7 @@ def _run(runner: Runner, visit: Visit, attendance: Attendance, loop: str) -> Sim
 
 def _keep(done: Path, path: Path) -> None:
     try:
-        done.rename(path)
+        give_name(done, path)
     except OSError as error:
         if not path.exists():  # another worker was given the same participant, and was faster
             raise RecordingError(

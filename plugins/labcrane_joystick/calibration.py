@@ -9,7 +9,7 @@ from pydantic import Field, ValidationError, model_validator
 from ruamel.yaml import YAML
 
 from labcrane import DeviceError, ProtocolError, Settings
-from labcrane.core import read_yaml
+from labcrane.core import give_name, read_yaml
 
 RUN_AGAIN = "run 'python -m labcrane_joystick' to identify and calibrate the sticks"
 REMOVE = f"remove it and {RUN_AGAIN}"
@@ -118,7 +118,7 @@ def save(path: Path, model: str, found: Calibrations) -> None:
             YAML().dump(content, file)
             file.flush()
             os.fsync(file.fileno())
-        beside.replace(path)
+        give_name(beside, path)
     except OSError as error:
         raise DeviceError(
             f"{path} cannot be written: {error.strerror}; set LABCRANE_CONFIG to a folder that can"

@@ -15,6 +15,7 @@ import pytest
 from labcrane import RecordingError
 from labcrane.cli.typed import chunks_by_thread
 from labcrane.core.findings import Verdict
+from labcrane.errors import StorageError
 from labcrane.files import atomic, lock, system
 from labcrane.files.append import AppendFile
 
@@ -226,3 +227,60 @@ def test_who_may_read_is_said_where_permissions_do_not_tell(
     assert said(tmp_path / "user" / "study") == [(Verdict.PASS, "")]
     fix = f'icacls "{tmp_path}" /inheritance:r /grant:r "%USERNAME%:(OI)(CI)F"'
     assert said(tmp_path) == [(Verdict.WARN, fix)]
+
+
+class Scanner:
+    """Holds a file for some time, as programs do on Windows; the clock goes on by the waits."""
+
+    def __init__(self, code: int, for_s: float, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 0.0
+        for name in ("replace", "rename"):
+            self._refuse(name, code, for_s, monkeypatch)
+        monkeypatch.setattr(atomic.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(atomic.time, "sleep", self._wait)
+
+    def _wait(self, seconds: float) -> None:
+        self.now += seconds
+
+    def _refuse(self, name: str, code: int, for_s: float, monkeypatch: pytest.MonkeyPatch) -> None:
+        own = getattr(Path, name)
+
+        def give(path: Path, target: Path) -> Path:
+            if self.now < for_s:
+                error = PermissionError(13, "Access is denied")
+                error.winerror = code  # type: ignore[attr-defined]
+                raise error
+            return own(path, target)
+
+        monkeypatch.setattr(Path, name, give)
+
+
+@pytest.mark.parametrize("code", [5, 32, 33])
+def test_what_a_scanner_holds_for_a_moment_is_replaced(
+    code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "register.json"
+    path.write_text("old")
+    folder = tmp_path / ".bundle"
+    folder.mkdir()
+    scanner = Scanner(code, 1.9, monkeypatch)
+    atomic.write_text(path, "new")
+    assert path.read_text() == "new"
+    assert scanner.now == pytest.approx(1.9, abs=0.06)
+    scanner.now = 0.0
+    atomic.give_name(folder, tmp_path / "bundle")
+    assert (tmp_path / "bundle").is_dir()
+
+
+@pytest.mark.parametrize(("code", "tried_s"), [(5, 2.0), (32, 2.0), (17, 0.0), (183, 0.0)])
+def test_what_stays_refused_is_an_error_and_unchanged(
+    code: int, tried_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "register.json"
+    path.write_text("old")
+    scanner = Scanner(code, 60.0, monkeypatch)
+    with pytest.raises(StorageError, match="it is unchanged"):
+        atomic.write_text(path, "new")
+    assert scanner.now == pytest.approx(tried_s, abs=0.06)
+    assert [each.name for each in tmp_path.iterdir()] == ["register.json"]
+    assert path.read_text() == "old"
