@@ -5,12 +5,13 @@ Denavit-Hartenberg table. Angles are degrees in YAML, and radians everywhere els
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import Field, PositiveFloat, ValidationInfo, model_validator
 
-from labcrane.files.model import StrictModel
+from labcrane.files.model import StrictModel, was_run
 from labcrane.machines.meshes.mesh_file import Looks, MeshFile
 
 FEWEST_JOINTS = 3
@@ -20,6 +21,28 @@ GRAVITY = 9.81
 
 UPWARD_TO_LEVEL = -90.0
 """Twist in degrees from a slew axis to the pitch axes behind it."""
+
+
+ROUNDING = 1e-9
+"""Share of the largest moment of inertia that rounding may take from the sum of the others."""
+
+
+def impossible(inertia: Sequence[float]) -> str:
+    """Return why no body has these moments of inertia, xx, yy, zz, xy, xz and yz in kg m².
+
+    Empty if one has.
+    """
+    import numpy as np  # noqa: PLC0415 - most protocols are checked without
+
+    xx, yy, zz, xy, xz, yz = inertia
+    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    least, middle, largest = moments.tolist()
+    shown = f"the principal moments of inertia {least:.4g}, {middle:.4g} and {largest:.4g} kg m²"
+    if least <= 0.0:
+        return f"has {shown}; all must be above 0"
+    if least + middle < largest * (1.0 - ROUNDING):
+        return f"has {shown}; no body has one that is larger than the sum of the others"
+    return ""
 
 
 class Joint(StrictModel):
@@ -81,6 +104,13 @@ class Joint(StrictModel):
                 f"rest_deg {self.rest_deg:g} is outside the joint's range; it must be "
                 f"{lowest:g} to {highest:g}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _a_body_has_its_inertia(self, info: ValidationInfo) -> "Joint":
+        given = None if was_run(info) else self.inertia_kgm2
+        if given is not None and (why := impossible(given)):
+            raise ValueError(f"link {self.name!r} {why}; correct inertia_kgm2")
         return self
 
     @property

@@ -520,3 +520,51 @@ def test_a_limit_that_is_not_written_is_zero(tmp_path: Path) -> None:
     (tmp_path / "openmanipulator_x.urdf").write_text(without)
     with pytest.raises(ProtocolError, match="'joint1' goes from 0 to 0 rad by its"):
         described(OMX, tmp_path)
+
+
+def inertia_of(moments: np.ndarray, dice: np.random.Generator) -> str:
+    """Return a body's moments of inertia, turned at random, as URDF has them."""
+    turn, _ = np.linalg.qr(dice.normal(size=(3, 3)))
+    full = turn @ np.diag(moments) @ turn.T
+    at = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
+    return " ".join(f'{name}="{float(full[place])!r}"' for name, place in at.items())
+
+
+def with_inertia(folder: Path, inertia: str, mass: float = 9.0) -> Machine:
+    text = MIMIC.format(
+        links="".join(
+            f'<link name="l{at}"><inertial>'
+            + (f'<mass value="{mass}"/><inertia {inertia}/>' if at == 2 else WEIGHT)
+            + "</inertial></link>"
+            for at in range(5)
+        ),
+        mimic="",
+        beside="",
+    )
+    (folder / "arm.urdf").write_text(text)
+    return described(
+        {"urdf": "arm.urdf", "joints": ["slew", "lift", "reach"], "tip": "fork"}, folder
+    )
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_an_inertia_that_bodies_have_is_taken_and_any_other_refused(
+    seed: int, tmp_path: Path
+) -> None:
+    """Bodies are points drawn at random, each with a mass; so their moments are possible ones."""
+    dice = np.random.default_rng(seed)
+    points, masses = dice.normal(size=(9, 3)), dice.uniform(0.1, 5.0, 9)
+    spread = np.cov(points.T, aweights=masses, bias=True) * masses.sum()
+    moments = np.linalg.eigvalsh(np.trace(spread) * np.eye(3) - spread)
+    with_inertia(tmp_path, inertia_of(moments, dice))
+    negative = moments * np.array([-1.0, 1.0, 1.0])
+    unequal = np.array([*moments[:2], (moments[0] + moments[1]) * dice.uniform(1.001, 3.0)])
+    for wrong, said in (
+        (negative, "above 0"),
+        (unequal, "sum of the others"),
+        (0 * moments, "above 0"),
+    ):
+        with pytest.raises(ProtocolError, match=f"link 'l2' has the principal moments.*{said}"):
+            with_inertia(tmp_path, inertia_of(wrong, dice))
+    with pytest.raises(ProtocolError, match="link 'l2' has a mass of -3 kg"):
+        with_inertia(tmp_path, inertia_of(moments, dice), mass=-3.0)

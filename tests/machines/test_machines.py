@@ -105,6 +105,13 @@ def test_a_machine_beside_the_study_is_read_in_degrees_and_gives_radians(tmp_pat
         ),
         (
             "    effort: 9",
+            "    effort: 9\n    inertia_kgm2: [1, 1, 2.1, 0, 0, 0]",
+            "digger.yaml:5:5: joints[2]: link 'boom' has the principal moments of inertia 1, 1 "
+            "and 2.1 kg m²; no body has one that is larger than the sum of the others; correct "
+            "inertia_kgm2",
+        ),
+        (
+            "    effort: 9",
             "    effort: 9\n    rest_deg: 61",
             "digger.yaml:5:5: joints[2]: rest_deg 61 is outside the joint's range; it must "
             "be -60 to 60",

@@ -24,6 +24,7 @@ from labcrane.machines.descriptions.chain import (
     together,
 )
 from labcrane.machines.descriptions.robot_xml import check_robot
+from labcrane.machines.machine import impossible
 from labcrane.types import FloatArray
 
 TURNING = ("revolute", "continuous")
@@ -241,13 +242,17 @@ class UrdfFile:
         pose = self._poses[link] @ _origin(inertial)
         mass, inertia = inertial.find("mass"), inertial.find("inertia")
         moments = {} if inertia is None else inertia.attrib
-        ixx, iyy, izz, ixy, ixz, iyz = (
+        given = ixx, iyy, izz, ixy, ixz, iyz = tuple(
             _number(moments, key, link, 0.0) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
         )
         own = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-        turned = pose[:3, :3] @ own @ pose[:3, :3].T
         attributes: Mapping[str, str] = {} if mass is None else mass.attrib
-        return Mass(_number(attributes, "value", link, 0.0), pose[:3, 3], turned)
+        weighs = _number(attributes, "value", link, 0.0)
+        if weighs < 0.0:
+            raise ChainError(f"link {link!r} has a mass of {weighs:g} kg; it must not be negative")
+        if (weighs > 0.0 or own.any()) and (why := impossible(given)):
+            raise ChainError(f"link {link!r} {why}; correct its <inertia>")
+        return Mass(weighs, pose[:3, 3], pose[:3, :3] @ own @ pose[:3, :3].T)
 
 
 def _name(element: ElementTree.Element) -> str:
