@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning
+from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from labcrane.errors import ProtocolError
@@ -37,6 +38,7 @@ MOST_BITS = 1000
 _MARKS = re.compile(r"[,:\[\]{}\n-]")
 _BRACKETS = re.compile(r"[\[\]{}]")
 _TWO_WHOLE = re.compile(r"[-+]?\d+,\d+(?![\d.eE])")
+_CUT = re.compile(r"[ \t]+(#(?:[^\s#].*|.*\?))\s*$")
 _OLD = re.compile(r"(?:\ufeff?(?:[ \t]*(?:#.*)?|%(?!YAML).*)\n)*?(?=%YAML[ \t]+1\.[01](?!\d))")
 _STAIRS = re.compile(r"(?:[-?:] *){50}| {200}")
 
@@ -118,6 +120,18 @@ class YamlFile:
         """
         yield from _uneven_commas(self._marked, (), self.text.split("\n"))
 
+    def cut_texts(self) -> Iterator[tuple[Place, str]]:
+        """Yield the places of texts without quotation marks that end at a ``#``.
+
+        With each place comes the rest of the line, if that may be meant as text: it has no space
+        behind the ``#``, or ends in a question mark.
+        """
+        lines = self.text.split("\n")
+        for place, node in _plain_texts(YAML(typ="rt", pure=True).compose(self.text), ()):
+            end = node.end_mark
+            if found := _CUT.match(lines[end.line], end.column):
+                yield place, found[1]
+
     def check(self, model: type[ModelT], place: Place = (), value: Any = None) -> ModelT | None:
         """Return the value at ``place`` as a ``model``, or note its mistakes and return None.
 
@@ -195,6 +209,18 @@ def _uneven_commas(node: Any, place: Place, lines: Sequence[str]) -> Iterator[tu
             return
         for at, value in enumerate(node):
             yield from _uneven_commas(value, (*place, at), lines)
+
+
+def _plain_texts(node: Any, place: Place) -> Iterator[tuple[Place, ScalarNode]]:
+    """Yield the values that are texts without quotation marks, with their places."""
+    if isinstance(node, MappingNode):
+        for key, value in node.value:
+            yield from _plain_texts(value, (*place, str(key.value)))
+    elif isinstance(node, SequenceNode):
+        for at, value in enumerate(node.value):
+            yield from _plain_texts(value, (*place, at))
+    elif isinstance(node, ScalarNode) and not node.style and str(node.tag).endswith(":str"):
+        yield place, node
 
 
 def _is_number(node: Any) -> bool:

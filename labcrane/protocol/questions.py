@@ -168,6 +168,7 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_sizes(study)  # first: other warnings about the same number are more specific
     yield from _of_components(study)
     yield from _of_commas(study)
+    yield from _of_cut_texts(study)
     yield from _of_the_loop(study)
     yield from _of_feedback(study)
     yield from _of_what_nobody_sees(study)
@@ -950,6 +951,18 @@ def _of_commas(study: Study) -> Doubts:
                 f"{key_of(place)} has {two} without a space beside commas with one, which are two "
                 f"numbers; write {two.replace(',', '.')} if one is meant, or else "
                 f"{two.replace(',', ', ')}"
+            ),
+        )
+
+
+def _of_cut_texts(study: Study) -> Doubts:
+    """Question texts that go on behind a space and a ``#``, which begins a comment."""
+    for place, rest in study.source.cut_texts() if study.source else ():
+        yield (
+            place,
+            (
+                f"{key_of(place)} ends before {rest!r}, which YAML reads as a comment; put the "
+                "text in quotation marks, or write the comment in a line of its own"
             ),
         )
 

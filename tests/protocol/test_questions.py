@@ -716,3 +716,40 @@ def test_a_rate_that_this_computer_cannot_hold_is_asked_about_by_a_rehearsal(
     assert asked["rehearsal.rate_hz"].place == ("rate_hz",)
     fast = rehearse(a_study(tmp_path, slow, ("rate_hz: 240", "rate_hz: 50")))
     assert "rehearsal.rate_hz" not in {each.key for each in fast.questions}
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_text_that_ends_at_a_number_sign_is_asked_about_where_that_may_be_text(
+    seed: int, tmp_path: Path
+) -> None:
+    """Drawn: a text, with or without quotation marks, and what is behind the sign."""
+    dice = Random(seed)
+    before = " ".join(dice.choice(["Which", "crane", "was", "harder", "é"]) for _ in range(3))
+    cases = [
+        (f"{before} #{dice.randint(1, 9)} or #2", True),
+        (f"{before} # {dice.randint(1, 9)} or 2?", True),
+        (f"{before}   #harder", True),
+        (f"{before} # a comment", False),
+        (f"{before} ## heading", False),
+        (f"{before}#1", False),
+        (f"'{before} #1 or #2?'", False),
+        (f'"{before} #1"', False),
+    ]
+    for text, asked in dice.sample(cases, len(cases)):
+        own = f"questionnaires:\n  q:\n    use: free\n    title: Q\n    questions:\n      - name: a\n        text: {text}\nsessions:"
+        study = a_study(tmp_path, ("sessions:", own), (BLOCK, f"{BLOCK}      - questionnaire: q\n"))
+        found = [
+            each for each in questions(study) if each.key == "questionnaires.q.questions.1.text"
+        ]
+        assert bool(found) == asked, text
+        if found:
+            (cut,) = found
+            assert text[text.index("#") :] in cut.text
+            assert study.source is not None
+            line, column = study.source.position(cut.place)
+            assert study.source.text.splitlines()[line - 1][column - 1 :] == text
+
+
+def test_a_number_with_a_comment_is_not_asked_about(tmp_path: Path) -> None:
+    study = a_study(tmp_path, ("rate_hz: 240", "rate_hz: 240 #Hz"))
+    assert "rate_hz" not in {each.key for each in questions(study)}
