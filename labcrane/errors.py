@@ -90,5 +90,42 @@ def meant(word: str, known: Sequence[str]) -> str:
     """Return the known word that is closest, as a question; nothing when none is close."""
     from difflib import get_close_matches  # noqa: PLC0415 - only a mistake needs it
 
+    for other in known:
+        if look(other) == look(word):
+            return f"did you mean {other!r}? {unlike(word, other)}"
     close = get_close_matches(word, known, n=1)
     return f"did you mean {close[0]!r}?" if close else ""
+
+
+LATIN = str.maketrans(
+    "\u0391\u0392\u0395\u0396\u0397\u0399\u039a\u039c\u039d\u039f\u03a1\u03a4\u03a5\u03a7\u03bf"
+    "\u0410\u0412\u0415\u041a\u041c\u041d\u041e\u0420\u0421\u0422\u0425\u0405\u0406\u0408"
+    "\u0430\u0435\u043e\u0440\u0441\u0443\u0445\u0455\u0456\u0458",
+    "ABEZHIKMNOPTYXoABEKMHOPCTXSIJaeopcyxsij",
+)
+"""Greek and Cyrillic letters that look like Latin ones."""
+
+
+def look(name: str) -> str:
+    """Return a key that is equal for names that look alike.
+
+    Accents as letters' parts or beside them, signs that are not seen, blanks, and letters of other
+    scripts that look Latin.
+    """
+    if name.isascii():
+        return " ".join(name.split())
+    import unicodedata  # noqa: PLC0415 - most names need none
+
+    whole = unicodedata.normalize("NFC", name)
+    seen = (each for each in whole if unicodedata.category(each) != "Cf")
+    return " ".join("".join(seen).split()).translate(LATIN)
+
+
+def unlike(name: str, other: str) -> str:
+    """Return in which code points two names differ that look alike."""
+    one, two = (
+        " ".join(f"U+{ord(each):04X}" for each in dict.fromkeys(own) if each not in against)
+        for own, against in ((name, other), (other, name))
+    )
+    differences = f"{name!a} has {one or 'other blanks'}"
+    return f"They look alike, but {differences}" + (f", and {other!a} has {two}" if two else "")

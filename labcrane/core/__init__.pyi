@@ -46,10 +46,12 @@ from .settings import (
     WrongKey,
     file_name_of,
     give_name,
+    look,
     outside,
     read_csv_text,
     read_settings,
     read_yaml,
+    unlike,
     was_run,
 )
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
@@ -111,6 +113,7 @@ __all__ = [
     "file_name_of",
     "give_name",
     "kernel",
+    "look",
     "name_of",
     "numeric_answers",
     "outside",
@@ -118,5 +121,6 @@ __all__ = [
     "read_settings",
     "read_yaml",
     "signals_of",
+    "unlike",
     "was_run",
 ]

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 from pydantic import AfterValidator, BaseModel, ValidationInfo
 
 from labcrane.core.references import Reference
+from labcrane.errors import look as look  # noqa: PLC0414 - public here
+from labcrane.errors import unlike as unlike  # noqa: PLC0414
 from labcrane.files.atomic import give_name as give_name  # noqa: PLC0414 - public here
 from labcrane.files.complaints import WrongKey as WrongKey  # noqa: PLC0414 - public here
 from labcrane.files.model import AtMost as AtMost  # noqa: PLC0414 - public here

@@ -18,7 +18,7 @@ from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
-from labcrane.errors import ProtocolError
+from labcrane.errors import ProtocolError, look, unlike
 from labcrane.files.complaints import Place as Place  # noqa: PLC0414 - public here
 from labcrane.files.complaints import is_member, named, shown, told
 from labcrane.files.misread import GARBLED, misread, unreadable
@@ -361,8 +361,8 @@ class _Misfit(Exception):  # noqa: N818 - it is reported as an error of the prot
     at: str | None = None
 
 
-def _check_key(node: Any, key: Any, others: Mapping[str, Any]) -> None:
-    """Refuse a key that is not a name, or that equals another key once it is a text."""
+def _check_key(node: Any, key: Any, others: Mapping[str, Any], looks: dict[str, str]) -> None:
+    """Refuse a key that is not a name, or that equals another one as a text or by its looks."""
     if key is None or isinstance(key, Mapping | list | tuple):
         what = "nothing" if key is None else "a mapping or a list"
         why = f"has {what} for a key; write a name, in quotation marks if it is one"
@@ -372,6 +372,8 @@ def _check_key(node: Any, key: Any, others: Mapping[str, Any]) -> None:
         why = f"has the character U+{ord(sign):04X} in the key {str(key)[:40]!r}; leave it out"
     elif str(key) in others:
         why = f"has the key {str(key)!r} twice, with and without quotation marks; keep one"
+    elif (other := looks.setdefault(look(str(key)), str(key))) != str(key):
+        why = f"has the keys {other!r} and {str(key)!r}. {unlike(str(key), other)}; rename one"
     else:
         return
     misfit = _Misfit(why)
@@ -499,9 +501,10 @@ def _plain(node: Any, name: str, *, recorded: bool = False) -> Any:
         try:
             if isinstance(node, Mapping):
                 held: Any = {}
+                looks: dict[str, str] = {}
                 for at, value in node.items():
                     if not recorded:
-                        _check_key(node, at, held)
+                        _check_key(node, at, held, looks)
                     held[str(at)] = plain(value, depth + 1)
             elif isinstance(node, list | tuple | Set):
                 held = []

@@ -16,8 +16,10 @@ from labcrane.core import (
     Reference,
     StudyPath,
     WrongKey,
+    look,
     outside,
     read_yaml,
+    unlike,
     was_run,
 )
 
@@ -280,8 +282,18 @@ class QuestionSettings(Settings):
     @field_validator("choices")
     @classmethod
     def _each_is_another(cls, choices: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
-        if (twice := _twice(choices)) and not was_run(info):
+        if was_run(info):
+            return choices
+        if twice := _twice(choices):
             raise ValueError(f"{twice[0]!r} is listed twice; write each once")
+        known: dict[str, str] = {}
+        for each in choices:
+            if len(each.splitlines()) > 1:
+                raise ValueError(
+                    f"{each!r} has a line end, which tables do not hold; write it in one line"
+                )
+            if (other := known.setdefault(look(each), each)) != each:
+                raise ValueError(f"{other!r} and {each!r}. {unlike(each, other)}; rename one")
         return choices
 
     @model_validator(mode="after")
