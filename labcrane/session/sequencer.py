@@ -8,7 +8,7 @@ from collections.abc import Generator, Iterable, Mapping, Sequence
 from math import inf
 
 from labcrane.core.clock import Tick
-from labcrane.core.records import Event, Frame, Phase, Trial, Value
+from labcrane.core.records import UNDONE, Event, Frame, Phase, Trial, Value
 from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
 from labcrane.design.practice import WarmUp
 from labcrane.participants.personal_data import personal
@@ -42,6 +42,7 @@ from labcrane.session.standing import EXAMINER, STOP, SessionStage, Standing, wh
 from labcrane.session.trial import TrialRun
 
 Ticks = Generator[None, Frame, None]
+Attempts = Generator[None, Frame, Phase]
 
 
 class Sequencer:
@@ -263,8 +264,8 @@ class Sequencer:
             chosen = self._ledger.chosen(block, trial)
             if chosen is None:
                 break  # its track has come to its end
-            yield from self._trial(block, chosen)
-            for name in block.ask if trial.planned.counted else ():
+            ended = yield from self._trial(block, chosen)
+            for name in block.ask if trial.planned.counted and ended not in UNDONE else ():
                 yield from self._ask(name, {}, trial)
         yield from self._judged()
         if block.track is not None:
@@ -290,11 +291,12 @@ class Sequencer:
         self._note("judgement.over", **about, done=not self._held.ending)
         self._enter()
 
-    def _trial(self, block: PlannedBlock, trial: Trial) -> Ticks:
-        while (yield from self._attempt_at(block, trial)) in self._redone:
+    def _trial(self, block: PlannedBlock, trial: Trial) -> Attempts:
+        while (ended := (yield from self._attempt_at(block, trial))) in self._redone:
             trial = next_attempt(self._study, self._plan, trial)
+        return ended
 
-    def _attempt_at(self, block: PlannedBlock, trial: Trial) -> Generator[None, Frame, Phase]:
+    def _attempt_at(self, block: PlannedBlock, trial: Trial) -> Attempts:
         """Run one attempt, when no missed tick is left; return how it ended."""
         while self._behind:
             yield

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rehearsal import Rehearsal, StallingClock, a_study, rehearse
+from rehearsal import DiesError, DiesInTrial, Rehearsal, StallingClock, a_study, rehearse
 
+from labcrane.core.clock import Clock
 from labcrane.core.records import Frame
 from labcrane.protocol.protocol import OnFault
 from labcrane.protocol.study import Study
@@ -16,6 +17,7 @@ from labcrane.recording.participant_file.reader import open_recording
 from labcrane.replay import replay_session
 from labcrane.session import session as session_module
 from labcrane.session.commands import Command, Order, QueueConsole
+from labcrane.session.resume import Progress
 from labcrane.session.session import Visit, run
 
 LIMIT_S = 0.25
@@ -152,3 +154,31 @@ def test_a_recording_with_stalls_is_replayed_bit_for_bit(
     again = replay_session(path, 1)
     assert again.difference is None
     assert again.ticks == len(session.streams["state"].time)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2))
+def test_a_session_that_stalls_and_then_dies_is_completed_with_each_trial_done_once(
+    study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    dice = random.Random(seed)
+    into, stall_s = dice.randint(5, 60), LIMIT_S + dice.uniform(0.05, 1.0)
+    tick = ticks_of(rehearse(study), 2)[into]
+    clock = session_module._clock
+
+    def stalling(visit: Visit, so_far: Progress | None) -> Clock:
+        return StallingClock({tick: stall_s}) if so_far is None else clock(visit, so_far)
+
+    monkeypatch.setattr(session_module, "_clock", stalling)
+    visit = Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True)
+    # While ticks are caught up, or in the attempt that follows.
+    dies = into + dice.choice([round(stall_s * 120), round(stall_s * 240) + 30])
+    with pytest.raises(DiesError):
+        run(visit, DiesInTrial(2, dies))
+    path = run(replace(visit, resumed=True), QueueConsole())
+    trials = open_recording(path).session(1).trials
+    assert trials.query("outcome == 'success'")["trial"].tolist() == [2, 3]
+    assert trials.query("trial == 2")["attempt"].tolist() == list(
+        range(1, 1 + (trials["trial"] == 2).sum())
+    )
+    assert set(trials["outcome"]) == {"interrupted", "success"}
