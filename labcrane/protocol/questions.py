@@ -180,6 +180,7 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_the_machine(study)
     yield from _of_silent_blocks(study)
     yield from _of_what_groups_are_not_given(study)
+    yield from _of_numbers_for_names(study)
     yield from _of_groups(study)
     yield from _of_squares(study)
     yield from _of_conditions(study)
@@ -617,6 +618,26 @@ def _of_what_groups_are_not_given(study: Study) -> Doubts:
                 f"{kind} {int(place[3]) + 1} gives feedback to groups to whom the design does not "
                 f"give it, {said}; write feedback: group",
             )
+
+
+def _of_numbers_for_names(study: Study) -> Doubts:
+    """Question levels that a reader of tables takes for numbers or truths: a test has one slope."""
+    design = study.protocol.design
+    for key, names in (("groups", design.groups), ("conditions", design.conditions)):
+        if len(names) > 1 and all(map(_is_guessed, names)):
+            yield (
+                ("design", key),
+                f"the {key} {', '.join(map(repr, names))} are numbers or truths to programs that "
+                "guess types of columns, which then test them as one slope; use words",
+            )
+
+
+def _is_guessed(name: str) -> bool:
+    try:
+        float(name)
+    except ValueError:
+        return name.lower() in {"t", "f", "true", "false"}
+    return True
 
 
 def _of_groups(study: Study) -> Doubts:

@@ -753,3 +753,18 @@ def test_a_text_that_ends_at_a_number_sign_is_asked_about_where_that_may_be_text
 def test_a_number_with_a_comment_is_not_asked_about(tmp_path: Path) -> None:
     study = a_study(tmp_path, ("rate_hz: 240", "rate_hz: 240 #Hz"))
     assert "rate_hz" not in {each.key for each in questions(study)}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_groups_and_conditions_that_readers_take_for_numbers_are_asked_about(
+    seed: int, tmp_path: Path
+) -> None:
+    dice = Random(seed)
+    numbers = dice.sample(["1", "02", "1e5", "-3", "2.5", "T", "false", "inf"], 3)
+    for key in ("groups", "conditions"):
+        for names, asked in ((numbers, True), ([*numbers[:2], "low"], False)):
+            levels = ", ".join(f"'{each}': []" for each in names)
+            study = a_study(tmp_path, ("sessions:", f"design: {{{key}: {{{levels}}}}}\nsessions:"))
+            found = [each.text for each in questions(study) if "guess types" in each.text]
+            assert bool(found) == asked
+            assert all(repr(each) in found[0] for each in numbers if asked)
