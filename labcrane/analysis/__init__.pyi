@@ -4,11 +4,13 @@ from .codebook import codebook_of, levels_of
 from .cohort import Participant, find_cohort
 from .electrodes.mne import (
     EEG_READERS,
+    GAP,
     channel_types,
     eeg_streams,
     events_at,
     faults_of,
     to_mne,
+    untriggered,
     volts,
 )
 from .electrodes.sampled import Sampled, sampled
@@ -24,6 +26,7 @@ from .tables.dataset import Dataset, open_dataset
 
 __all__ = [
     "EEG_READERS",
+    "GAP",
     "PRESENTED",
     "Dataset",
     "Exporter",
@@ -53,6 +56,7 @@ __all__ = [
     "sampled",
     "scores_of",
     "to_mne",
+    "untriggered",
     "volts",
     "with_unseen_areas",
 ]

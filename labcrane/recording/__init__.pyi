@@ -11,11 +11,13 @@ from .labels import (
 from .participant_file.about import citation
 from .participant_file.reader import Recording, SessionRecord, Stream, open_recording
 from .participant_file.writer import put_seal
+from .pictures import LOG
 from .xdf.header import Channel, StreamHeader
 from .xdf.writer import XdfWriter
 
 __all__ = [
     "LABELS",
+    "LOG",
     "Annotation",
     "Channel",
     "Recording",

@@ -1,5 +1,6 @@
 """A whole data set, session by session."""
 
+from collections import Counter
 from collections.abc import Iterable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -26,7 +27,7 @@ from labcrane_bids.files import (
 )
 from labcrane_bids.motion import TrackingSystem, tracking_systems
 from labcrane_bids.phenotype import Phenotype, demographics_of
-from labcrane_bids.physio import continuous_recordings, left_out
+from labcrane_bids.physio import continuous_recordings
 from labcrane_bids.settings import BidsSettings
 
 FIRST_DAY = datetime(1925, 1, 1, tzinfo=UTC)
@@ -38,8 +39,9 @@ class Bids(Exporter):
 
     EEG is written as BrainVision files, with the samples as recorded. Each event is at the sample
     that was taken at the same time, by the corrected clock. A questionnaire that a participant
-    answered more than once is in ``beh`` with its trials. BIDS has no place for streams of texts or
-    of numbers without a rate: the README lists them.
+    answered more than once is in ``beh`` with its trials. Missing samples are rows without a value,
+    so that start and rate give the time of every row. BIDS has no place for streams of texts, or of
+    numbers without a steady rate: the README lists what is left out, and why.
     """
 
     shared = (
@@ -53,7 +55,7 @@ class Bids(Exporter):
     def __init__(self, settings: BidsSettings, machine: Machine) -> None:
         self._settings = settings
         self._machine = machine
-        self._without: set[str] = set()
+        self._without: Counter[tuple[str, str]] = Counter()
         self._labels = EntityLabels()
 
     def export(self, participants: Iterable[Participant], folder: Path) -> None:
@@ -84,7 +86,7 @@ class Bids(Exporter):
                 at = folder / subject / f"ses-{number:02}"
                 stem = f"{subject}_ses-{number:02}"
                 self._session(at, stem, session, moved)
-        describe_dataset(folder, self._settings, contexts, sorted(self._without))
+        describe_dataset(folder, self._settings, contexts, self._without)
         describe_participants(folder, rows)
         copy_phenotype(self._settings.phenotype, folder, phenotype.write(folder))
 
@@ -112,7 +114,7 @@ class Bids(Exporter):
             signal = write_eeg(path, stream, session, events, task, self._settings)
             write_json(path.with_name(f"{named}{which}_events.json"), eeg_description(about))
             scans.append((f"eeg/{path.name}.vhdr", float(signal.time[0] - zero)))
-        recordings = continuous_recordings(session, self._settings, self._labels)
+        recordings = continuous_recordings(session, self._settings, self._labels, self._without)
         for recording, samples, description in recordings:
             (at / "beh").mkdir(exist_ok=True)
             path = at / "beh" / f"{named}_recording-{recording}_physio"
@@ -122,7 +124,6 @@ class Bids(Exporter):
                 write_tsv(at / "beh" / f"{named}_events.tsv", events)
                 write_json(at / "beh" / f"{named}_events.json", about)
             scans.append((f"beh/{path.name}.tsv.gz", 0.0))
-        self._without |= set(left_out(session))
         when = [
             (started.astimezone(UTC) + timedelta(seconds=later)).strftime("%Y-%m-%dT%H:%M:%S.%fZ")
             for _, later in scans

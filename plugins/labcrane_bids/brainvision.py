@@ -19,7 +19,7 @@ def write_brainvision(
     pieces: Iterable[FloatArray],
     rate_hz: float,
     channels: Sequence[tuple[str, str]],
-    markers: Sequence[tuple[int, str]],
+    markers: Sequence[tuple[int, int, str]],
 ) -> None:
     """Write a recording as three files.
 
@@ -32,7 +32,8 @@ def write_brainvision(
     channels
         Name and unit of each.
     markers
-        Sample, counted from 0, and text of each.
+        Sample, counted from 0, number of samples, and text of each; one that begins with ``BAD`` is
+        a bad interval.
 
     Raises
     ------
@@ -80,7 +81,7 @@ def _header(name: str, rate_hz: float, channels: Sequence[tuple[str, str]]) -> l
     ]
 
 
-def _markers(name: str, markers: Sequence[tuple[int, str]]) -> list[str]:
+def _markers(name: str, markers: Sequence[tuple[int, int, str]]) -> list[str]:
     return [
         "Brain Vision Data Exchange Marker File, Version 1.0",
         "; Written by labcrane",
@@ -92,8 +93,9 @@ def _markers(name: str, markers: Sequence[tuple[int, str]]) -> list[str]:
         "[Marker Infos]",
         "; Marker number=type, text, sample counted from 1, samples, channel (0: all)",
         *(
-            f"Mk{number}=Comment,{_text(text)},{sample + 1},1,0"
-            for number, (sample, text) in enumerate(markers, 1)
+            f"Mk{number}={'Bad Interval' if text.startswith('BAD') else 'Comment'},{_text(text)},"
+            f"{sample + 1},{count},0"
+            for number, (sample, count, text) in enumerate(markers, 1)
         ),
     ]
 

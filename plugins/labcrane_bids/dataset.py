@@ -20,14 +20,14 @@ def describe_dataset(
     folder: Path,
     settings: BidsSettings,
     contexts: Sequence[Mapping[str, Any]],
-    left_out: Sequence[str] = (),
+    left_out: Mapping[tuple[str, str], int],
 ) -> None:
     """Write ``dataset_description.json`` and the README.
 
     Parameters
     ----------
     left_out
-        Streams that have no place in BIDS.
+        In how many sessions a stream has no place in BIDS, by its name and the reason.
     """
     title = str(contexts[0].get("title", "")) if contexts else ""
     versions = {str(context.get("versions", {}).get("labcrane", "")) for context in contexts}
@@ -49,9 +49,12 @@ def describe_dataset(
         description["License"] = settings.license
     write_json(folder / "dataset_description.json", description)
     dates = "moved to 1925 for each participant" if settings.shift_dates else "as recorded"
+    names = ", ".join(
+        f"{name} ({why}; sessions: {count})" for (name, why), count in sorted(left_out.items())
+    )
     without = (
-        f" Not included, because BIDS has no place for streams of texts or without a rate: "
-        f"{', '.join(left_out)}; they are in the participant files and in labcrane's XDF export."
+        f" Not included, because BIDS has no place for them: {names}; they are in the participant "
+        "files and in labcrane's XDF export."
         if left_out
         else ""
     )

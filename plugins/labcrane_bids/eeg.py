@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane.analysis import Sampled, channel_types, faults_of, sampled, volts
+from labcrane.analysis import (
+    GAP,
+    Sampled,
+    channel_types,
+    faults_of,
+    sampled,
+    untriggered,
+    volts,
+)
 from labcrane.recording import SessionRecord, Stream
 from labcrane_bids.brainvision import write_brainvision
 from labcrane_bids.files import MISSING, first_tick, write_json, write_tsv
@@ -21,9 +29,6 @@ TYPES = {"eeg": "EEG", "eog": "EOG", "ecg": "ECG", "emg": "EMG", "gsr": "GSR", "
 
 COUNTED = {"EEG": "EEG", "EOG": "EOG", "ECG": "ECG", "EMG": "EMG", "TRIG": "Trigger"}
 """Types that a description counts, and in which word; all others are miscellaneous."""
-
-GAP = "boundary"
-"""Marker of a sample before which some are missing, as EEGLAB calls it."""
 
 
 def write_eeg(
@@ -44,7 +49,8 @@ def write_eeg(
         The session's, in order, with an onset in seconds from the session's first tick.
     """
     signal = sampled(stream)
-    kinds = [TYPES[kind] for kind in channel_types(signal, stream)]
+    types = channel_types(signal, stream)
+    kinds = [TYPES[kind] for kind in types]
     scale = volts(signal, stream, settings.eeg_unit)
     electric = [kind in {"EEG", "EOG", "ECG", "EMG"} for kind in kinds]
     units = ["µV" if voltage else unit or MISSING for voltage, unit in zip(
@@ -56,10 +62,10 @@ def write_eeg(
     factors = np.where(electric, 1e6 * scale, scale)
     write_brainvision(
         path,
-        (piece * factors for piece in signal.pieces()),
+        (untriggered(piece * factors, types) for piece in signal.pieces()),
         signal.rate_hz,
         list(zip(signal.labels, units, strict=True)),
-        list(zip(table["sample"], table["trial_type"], strict=True)),
+        _markers(table, signal),
     )
     stem = path.name.removesuffix("_eeg")
     write_tsv(path.with_name(f"{stem}_events.tsv"), table)
@@ -73,12 +79,15 @@ def write_eeg(
 def eeg_description(about: Mapping[str, Any]) -> dict[str, Any]:
     """Return the description of the events of EEG, by that of the same ones beside motion."""
     kinds = about["trial_type"]
-    gap = {GAP: "samples are missing before this one"}
-    hed = {GAP: "(Experiment-control, Label/boundary)"}
+    gap = {GAP: "samples are missing from this one on, for the duration"}
+    hed = {GAP: f"(Experiment-control, Label/{GAP})"}
     return {
         **about,
         "onset": {"Description": "from the first sample of EEG", "Units": "s"},
-        "sample": {"Description": "number of the sample, counted from 0"},
+        "sample": {
+            "Description": "number of the sample, counted from 0; n/a before the first and after "
+            "the last"
+        },
         "trial_type": {
             **kinds,
             "Levels": {**kinds["Levels"], **gap},
@@ -88,18 +97,32 @@ def eeg_description(about: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _events(events: "pd.DataFrame", signal: Sampled, session: SessionRecord) -> "pd.DataFrame":
-    """Return the events within the recording, at its samples; and where samples are missing."""
+    """Return the events at their samples, and where samples are missing."""
     import pandas as pd
 
-    zero = first_tick(session)
-    positions = signal.at(events["onset"].to_numpy() + zero)
-    there = events.assign(onset=positions / signal.rate_hz)[pd.notna(positions)]
-    gaps = pd.DataFrame({"onset": signal.gaps / signal.rate_hz, "duration": 0.0})
+    times = events["onset"].to_numpy() + first_tick(session)
+    samples = signal.at(times)
+    edge = times.clip(signal.time[0], signal.time[-1])
+    outside = signal.at(edge) + (times - edge) * signal.rate_hz
+    rows = np.where(np.isnan(samples), outside, samples)
+    first, after = signal.holes.T
+    gaps = pd.DataFrame(
+        {"onset": first, "duration": (after - first) / signal.rate_hz, "sample": first}
+    )
+    there = events.assign(onset=rows, sample=pd.array(np.rint(samples), dtype="Int64"))
     table = pd.concat([there, gaps.assign(trial_type=GAP)] if len(gaps) else [there])
     table = table.sort_values("onset", kind="stable", ignore_index=True)
-    samples = (table["onset"] * signal.rate_hz).round().astype(int)
-    table.insert(2, "sample", samples)
+    table["onset"] /= signal.rate_hz
+    table.insert(2, "sample", table.pop("sample"))
     return table
+
+
+def _markers(table: "pd.DataFrame", signal: Sampled) -> list[tuple[int, int, str]]:
+    """Return sample, number of samples and name of what is within the recording."""
+    inside = table[table["sample"].notna()]
+    gap = inside["trial_type"] == GAP
+    lengths = (inside["duration"].where(gap, 0.0) * signal.rate_hz).round().clip(lower=1)
+    return list(zip(inside["sample"], lengths.astype(int), inside["trial_type"], strict=True))
 
 
 def _channels(
@@ -143,8 +166,8 @@ def _about(
         "SoftwareFilters": MISSING,
         "HardwareFilters": MISSING,
         "Manufacturer": str(stream.attrs.get("source_id", "")) or MISSING,
-        "RecordingType": "discontinuous" if len(signal.gaps) else "continuous",
-        "RecordingDuration": len(signal.time) / signal.rate_hz,
+        "RecordingType": "discontinuous" if len(signal.holes) else "continuous",
+        "RecordingDuration": len(signal) / signal.rate_hz,
         **counts,
         "MiscChannelCount": others,
         "Description": f"LSL stream {stream.name}; clock corrected, off by {clock}",

@@ -1,13 +1,14 @@
-"""Physio: gaze and other streams of numbers at a rate, each as a recording of its own."""
+"""Physio: gaze and other streams of numbers at a steady rate, each as a recording of its own."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from labcrane import FloatArray
-from labcrane.analysis import eeg_streams, gaze_space
-from labcrane.recording import SessionRecord, Stream
+from labcrane.analysis import Sampled, eeg_streams, gaze_space, sampled
+from labcrane.recording import LOG, SessionRecord, Stream
 from labcrane_bids.files import MISSING, ROWS, first_tick
 from labcrane_bids.settings import BidsSettings
 
@@ -27,61 +28,75 @@ SPACES = {"screen": ON_SCREEN, "scene": "eye-in-head"}
 with the head."""
 
 
+UNSTEADY = "no steady rate"
+
+STEADY_S = 0.01
+"""Seconds by which a time by rate and start may miss a sample's own."""
+
+RESTARTED = 0.6
+"""Sample periods by which it may do so where a source states its rate: when a source starts again,
+its samples are at other fractions of a period."""
+
+
 def continuous_recordings(
-    session: SessionRecord, settings: BidsSettings, label: Callable[[str], str]
+    session: SessionRecord,
+    settings: BidsSettings,
+    label: Callable[[str], str],
+    left_out: Counter[tuple[str, str]],
 ) -> Iterator[tuple[str, Iterator[list[FloatArray]], dict[str, Any]]]:
-    """Yield recording label, samples and description of each stream except EEG."""
+    """Yield recording label, samples and description of each stream except EEG.
+
+    Parameters
+    ----------
+    left_out
+        Streams that are written nowhere, and the reason: each is counted.
+    """
     zero = first_tick(session)
+    brains = {stream.name for stream in eeg_streams(session)}
     eyes = 0
-    for stream in _others(session):
-        gaze = stream.attrs.get("type") == GAZE
-        if _is_text(stream) or (not gaze and not _rate(stream)):
+    for stream in session.streams.values():
+        if "corrected" not in stream.attrs or stream.name in brains:
             continue
+        why = _unsampled(stream)
+        signal = None if why else sampled(stream)
+        if signal is None or not _is_steady(signal, stream):
+            left_out[stream.name, why or UNSTEADY] += 1
+            continue
+        gaze = stream.attrs.get("type") == GAZE
         eyes += gaze
         name = f"eye{eyes}" if gaze else label(stream.name)
-        yield name, *_recording(stream, zero, settings, gaze=gaze)
+        yield name, *_recording(stream, signal, zero, settings, gaze=gaze)
 
 
-def left_out(session: SessionRecord) -> list[str]:
-    """Return the streams that are written nowhere."""
-    return [
-        stream.name
-        for stream in _others(session)
-        if _is_text(stream) or (stream.attrs.get("type") != GAZE and not _rate(stream))
-    ]
+def _unsampled(stream: Stream) -> str:
+    """Return why a stream is not a sampled signal; empty if it may be one."""
+    if stream.name.startswith(LOG):
+        return "a log of labcrane"
+    if len(stream.numeric) != len(stream.units):
+        return "texts"
+    if not stream.attrs["corrected"]:
+        return "its clock was not corrected"
+    times = stream.column("time")
+    return UNSTEADY if len(times) == 0 or times.min() == times.max() else ""
 
 
-def _others(session: SessionRecord) -> list[Stream]:
-    brains = {stream.name for stream in eeg_streams(session)}
-    return [
-        stream
-        for name, stream in session.streams.items()
-        if "corrected" in stream.attrs and name not in brains
-    ]
-
-
-def _is_text(stream: Stream) -> bool:
-    return stream.attrs.get("format") == "string"
-
-
-def _rate(stream: Stream) -> float:
-    return float(stream.attrs.get("rate_hz", 0.0))
+def _is_steady(signal: Sampled, stream: Stream) -> bool:
+    """Return whether rate and start give the times of the samples."""
+    stated = stream.header is not None and stream.header.rate_hz > 0.0
+    return signal.off_s() <= max(STEADY_S, RESTARTED / signal.measured_hz if stated else 0.0)
 
 
 def _recording(
-    stream: Stream, zero: float, settings: BidsSettings, *, gaze: bool
+    stream: Stream, signal: Sampled, zero: float, settings: BidsSettings, *, gaze: bool
 ) -> tuple[Iterator[list[FloatArray]], dict[str, Any]]:
     place = _place(stream.numeric) if gaze else ()
     labels = [*place, *(name for name in stream.numeric if name not in place)]
     names = dict(zip(place, ("x_coordinate", "y_coordinate"), strict=False)) | PUPIL if gaze else {}
     called = [names.get(name, name) for name in labels]
-    rate_hz = _rate(stream)
-    if rate_hz == 0.0 and len(stream) > 1:
-        rate_hz = float(1.0 / np.median(np.diff(stream.column("time"))))
     columns = ["timestamp", *called]
     about: dict[str, Any] = {
-        "SamplingFrequency": rate_hz,
-        "StartTime": float(stream.column("time", 0, 1)[0] - zero) if len(stream) else 0.0,
+        "SamplingFrequency": signal.measured_hz,
+        "StartTime": signal.start - zero,
         "Columns": columns,
         "Description": f"LSL stream {stream.name}",
         "PhysioType": "eyetrack" if place else "generic",  # BIDS has no eyes without a place
@@ -98,7 +113,7 @@ def _recording(
     units = ["s", *(stream.units[name] or "arbitrary" for name in labels)]
     for column, unit in zip(columns, units, strict=True):
         about[column] = {"Description": column.replace("_", " "), "Units": unit}
-    return _samples(stream, zero, labels), about
+    return _samples(signal, zero, labels), about
 
 
 def _place(labels: Sequence[str]) -> tuple[str, ...]:
@@ -110,8 +125,11 @@ def _place(labels: Sequence[str]) -> tuple[str, ...]:
     return ()
 
 
-def _samples(stream: Stream, zero: float, labels: list[str]) -> Iterator[list[FloatArray]]:
-    """Yield time and channels, a piece at a time."""
-    for at in range(0, len(stream), ROWS):
-        values = stream.values(labels, at, at + ROWS)
-        yield [stream.column("time", at, at + ROWS) - zero, *values.values()]
+def _samples(signal: Sampled, zero: float, labels: list[str]) -> Iterator[list[FloatArray]]:
+    """Yield time and channels of all rows, a piece at a time; of a missing one the time alone."""
+    order = [signal.labels.index(name) for name in labels]
+    at = 0
+    for piece in signal.pieces(ROWS):
+        time = np.interp(np.arange(at, at + len(piece)), signal.rows, signal.time)
+        yield [time - zero, *piece.T[order]]
+        at += len(piece)

@@ -71,6 +71,7 @@ def record(
     eeg: bool = False,
     shown: Mapping[str, Callable[[float], FloatArray]] | None = None,
     others: Sequence[str] = (),
+    also: Callable[[XdfWriter, float, FloatArray], None] | None = None,
 ) -> Path:
     """Record session 1; a program takes the controls, whatever the stamps say.
 
@@ -79,7 +80,8 @@ def record(
     times on the session's clock, of eyes whose place in the window is known, in pixels. ``stated``
     has the coordinate system that the header of each stream in pixels states. ``shown`` says when
     each view showed its pictures, by its name, in a session that ended at that time. ``others`` are
-    names of streams at 25 Hz, each of which holds its own number.
+    names of streams at 25 Hz, each of which holds its own number. ``also`` writes more: it is
+    called with the journal of streams, the session's end and the times of its events.
     """
     visit = Visit(chosen, participant, 1, data, simulated=simulated, fast=True, pilot=pilot)
     plan = plan_session(chosen, participant, 1)
@@ -93,7 +95,7 @@ def record(
             log.note(Event("session.start", clock.now(), context(visit, plan, rig, run)))
             loop.run(rig, run, sequencer, clock, ScriptedConsole(orders), log, [])
     journals = [visit.journal]
-    if gaze or eeg or shown or others:
+    if gaze or eeg or shown or others or also:
         journals.append(visit.streams_journal)
         with XdfWriter(visit.streams_journal) as writer:
             if gaze is True:
@@ -109,9 +111,11 @@ def record(
                     name, "EDA", (Channel("a", "uS"),), "float32", 25.0, f"n{number}"
                 )
                 time = np.arange(95.0, clock.now(), 0.04)
-                _stream(writer, header, time, 0.0, np.full((len(time), 1), number, np.float32))
+                write_stream(writer, header, time, 0.0, np.full((len(time), 1), number, np.float32))
+            events = read_xdf(visit.journal).stream(EVENTS).stamps
+            if also:
+                also(writer, clock.now(), events)
             if eeg:
-                events = read_xdf(visit.journal).stream(EVENTS).stamps
                 _eeg(writer, clock.now(), events)
                 _pulse(writer, clock.now())
     consolidate(visit.folder.participant_file, journals, conclude)
@@ -127,7 +131,7 @@ def _gaze(writer: XdfWriter, until: float) -> None:
     header = StreamHeader("eyes", "Gaze", channels, "double64", 50.0, source_id="eyes")
     time = np.arange(90.0, until, 0.02)
     data = np.column_stack([np.sin(time), np.cos(time), (time % 1.0 < 0.5) * 1.0])
-    _stream(writer, header, time, OFFSET_S, data)
+    write_stream(writer, header, time, OFFSET_S, data)
 
 
 def in_pixels(stated: str) -> tuple[Channel, ...]:
@@ -150,7 +154,7 @@ def _gaze_in_window(
     spots = np.column_stack([x, np.full(len(time), 50.0)])
     for name, said in zip(("eyes", "glasses", "relay"), stated, strict=False):
         header = StreamHeader(name, "Gaze", in_pixels(said), "double64", 50.0, source_id=name)
-        _stream(writer, header, time, OFFSET_S, spots)
+        write_stream(writer, header, time, OFFSET_S, spots)
     boxes = []
     for at in range(len(cameras)):
         left = 1000.0 * at
@@ -165,7 +169,7 @@ def _gaze_in_window(
         source_id="areas",
     )
     shown = np.arange(90.0, until, 1 / 60)
-    _stream(writer, header, shown, 0.0, np.tile(boxes, (len(shown), 1)))
+    write_stream(writer, header, shown, 0.0, np.tile(boxes, (len(shown), 1)))
 
 
 def _gaze_at(writer: XdfWriter, until: float, where: Callable[[FloatArray], FloatArray]) -> None:
@@ -173,7 +177,7 @@ def _gaze_at(writer: XdfWriter, until: float, where: Callable[[FloatArray], Floa
     channels = in_pixels("screen")
     header = StreamHeader("eyes", "Gaze", channels, "double64", 120.0, source_id="eyes")
     time = np.arange(90.0, until, 1.0 / 120.0)
-    _stream(writer, header, time, OFFSET_S, where(time))
+    write_stream(writer, header, time, OFFSET_S, where(time))
 
 
 def _pictures(writer: XdfWriter, name: str, time: FloatArray) -> None:
@@ -182,7 +186,7 @@ def _pictures(writer: XdfWriter, name: str, time: FloatArray) -> None:
         f"labcrane.feedback.{name}", "Feedback", (Channel("frame.tick", "1"),), "double64",
         source_id=name,
     )  # fmt: skip
-    _stream(writer, header, time, 0.0, np.zeros((len(time), 1)))
+    write_stream(writer, header, time, 0.0, np.zeros((len(time), 1)))
 
 
 EEG_HZ = 250.0
@@ -215,7 +219,7 @@ def _eeg(writer: XdfWriter, until: float, events: FloatArray) -> None:
     data[at, 3] = 1.0
     keep = np.ones(len(time), bool)
     keep[LOST] = False
-    _stream(writer, header, time[keep], 777.0, data[keep], drift=-40e-6, told=FLAT)
+    write_stream(writer, header, time[keep], 777.0, data[keep], drift=-40e-6, told=FLAT)
 
 
 def _pulse(writer: XdfWriter, until: float) -> None:
@@ -223,10 +227,10 @@ def _pulse(writer: XdfWriter, until: float) -> None:
     channel = Channel("ecg", "millivolts", "ECG")
     header = StreamHeader("Heart", "ECG", (channel,), "int16", 100.0, source_id="heart")
     time = np.arange(96.0, until, 0.01)
-    _stream(writer, header, time, 0.0, (100 * np.sin(time))[:, None].astype(np.int16))
+    write_stream(writer, header, time, 0.0, (100 * np.sin(time))[:, None].astype(np.int16))
 
 
-def _stream(
+def write_stream(
     writer: XdfWriter,
     header: StreamHeader,
     time: FloatArray,
@@ -247,7 +251,11 @@ def _stream(
     rows = np.column_stack([remote, local - remote, np.full(n, 1e-4), local])
     writer.write_samples(probes, local, rows)
     arrivals = writer.add_stream(beside["arrivals"])
-    writer.write_samples(arrivals, time[-1:], np.array([[float(len(time)), float(time[-1])]]))
+    pulls = np.arange(time[0], time[-1] + 0.1, 0.1)
+    count = np.searchsorted(time, pulls, side="right")
+    came = np.flatnonzero(np.diff(count, prepend=0))
+    rows = np.column_stack([count[came], pulls[came]]).astype(float)
+    writer.write_samples(arrivals, pulls[came], rows)
     notes = writer.add_stream(beside["notes"])
     texts = {90.0: {"event": "begin"}, **told}
     writer.write_texts(notes, list(texts), [(json.dumps(each),) for each in texts.values()])

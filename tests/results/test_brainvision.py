@@ -11,7 +11,7 @@ from labcrane_bids.brainvision import write_brainvision
 
 CHANNELS = [("Fz", "µV"), ("a, b", "µV")]
 NAMES = ("ours", "theirs")
-MARKERS = [(0, "trial_start"), (9_999, "boundary")]
+MARKERS = [(0, 1, "trial_start"), (9_999, 1, "trial_end")]
 
 
 @needs("pybv")
@@ -25,7 +25,7 @@ def test_what_is_written_by_pieces_is_what_pybv_writes_at_once(tmp_path: Path) -
     pybv.write_brainvision(
         data=1e-6 * data.T.astype(float), sfreq=250.0, ch_names=[name for name, _ in CHANNELS],
         fname_base="x_eeg", folder_out=tmp_path / "theirs", resolution=1.0, unit="µV",
-        events=[{"onset": at, "description": text, "type": "Comment"} for at, text in MARKERS],
+        events=[{"onset": at, "description": text, "type": "Comment"} for at, _, text in MARKERS],
     )  # fmt: skip
     ours, theirs = ((tmp_path / name / "x_eeg.eeg").read_bytes() for name in NAMES)
     np.testing.assert_array_equal(np.frombuffer(ours, "<f4"), data.ravel())

@@ -54,15 +54,15 @@ def test_every_event_is_at_the_sample_that_has_its_pulse(session: SessionRecord)
     positions = signal.at(session.events["time"].to_numpy())
     assert len(positions) > 80
     at = np.rint(positions).astype(int)
-    assert set(at) == set(np.flatnonzero(signal.data[:, 3]))
+    assert set(at) == set(np.flatnonzero(signal.data[:, 3] == 1.0))
     assert signal.rate_hz == EEG_HZ
-    assert signal.gaps.tolist() == [LOST.start]
+    assert signal.holes.tolist() == [[LOST.start, LOST.stop]]
 
 
 def test_what_happened_outside_of_the_recording_is_at_no_sample(session: SessionRecord) -> None:
     signal = sampled(session.streams["BrainAmp"])
     around = np.array([signal.time[0] - 1.0, signal.time[0], signal.time[-1], signal.time[-1] + 1])
-    np.testing.assert_array_equal(signal.at(around), [np.nan, 0.0, len(signal.time) - 1, np.nan])
+    np.testing.assert_array_equal(signal.at(around), [np.nan, 0.0, len(signal) - 1, np.nan])
 
 
 def test_what_cannot_be_put_at_samples_is_refused_in_words(session: SessionRecord) -> None:
@@ -89,15 +89,14 @@ def test_events_of_eeg_and_of_motion_are_the_same_on_two_clocks(
     signal = sampled(session.streams["BrainAmp"])
     zero = session.streams["state"].time[0]
     assert later.total_seconds() == pytest.approx(signal.time[0] - zero, abs=2e-6)
-    (gap,) = eeg.index[eeg["trial_type"] == "boundary"]
+    (gap,) = eeg.index[eeg["trial_type"] == "BAD_ACQ_SKIP"]
     assert eeg["sample"][gap] == LOST.start
+    assert eeg["duration"][gap] == (LOST.stop - LOST.start) / EEG_HZ
     own = eeg.drop(index=gap).reset_index(drop=True)
     assert own["trial_type"].tolist() == motion["trial_type"].tolist()
-    # Until samples are missing, both are the same but for where they begin, and for 40 ppm.
-    until = motion["onset"] + zero < signal.time[LOST.start - 1]
+    # Both are the same but for where they begin, 40 ppm, and half a sample beyond the last.
     moved = own["onset"] + signal.time[0] - zero - motion["onset"]
-    assert 3 < until.sum() < len(own)
-    assert np.abs(moved[until]).max() < 40e-6 * 20.0
+    assert np.abs(moved).max() < 40e-6 * (motion["onset"].max() + 5.0) + 0.5 / EEG_HZ
     about = json.loads((bids / FOLDER / "eeg" / f"{NAME}_eeg.json").read_text(encoding="utf-8"))
     assert (about["EEGReference"], about["PowerLineFrequency"]) == ("FCz", 50.0)
     assert about["RecordingType"] == "discontinuous"
@@ -153,6 +152,7 @@ def test_mne_reads_the_participant_file_and_bids_alike_and_epochs_by_label(
     assert raw.get_channel_types() == ["eeg", "eeg", "eog", "stim"]
     signal = sampled(session.streams["BrainAmp"])
     np.testing.assert_allclose(raw.get_data()[:3].T, 1e-6 * signal.data[:, :3], rtol=1e-12)
+    assert np.isnan(raw.get_data()[:3, LOST]).all()
     (fault,) = (each for each in raw.annotations if each["description"] == "fault/flat_line")
     assert fault["ch_names"] == ("Fz",)
     zero = signal.time[0]
@@ -176,7 +176,7 @@ def test_mne_reads_the_participant_file_and_bids_alike_and_epochs_by_label(
     assert 0 < len(inward) < len(entered)
     middle = round(0.1 * EEG_HZ)
     assert (entered.get_data(verbose="error")[:, 0, middle] == 1.0).all()
-    assert "BAD_gap" in set(raw.annotations.description)
+    assert "BAD_ACQ_SKIP" in set(raw.annotations.description)
 
     path = mne_bids.BIDSPath(
         root=bids, subject="P001", session="01", task="acquisition", datatype="eeg"

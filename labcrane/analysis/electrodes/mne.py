@@ -1,5 +1,6 @@
 """MNE object of a stream of EEG, with the session's events at their samples."""
 
+from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from labcrane.errors import PluginError, RecordingError, nearest
 from labcrane.files.units import in_unit
 from labcrane.recording.labels import labelled, plain
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import mne
@@ -33,9 +35,9 @@ ELECTRIC = ("eeg", "eog", "ecg", "emg")
 
 FAULT_COLUMNS = (("channel", object), ("kind", object), ("start", float), ("end", float))
 
-GAP = "BAD_gap"
-"""Annotation of missing samples: MNE leaves out epochs that overlap one."""
-
+GAP = "BAD_ACQ_SKIP"
+"""Annotation of missing samples, as MNE's own readers call it: MNE leaves out epochs that overlap
+one, and filters the samples before it and after it separately."""
 
 FAULT = "fault"
 """Prefix of annotations of a channel's faults; it is not ``BAD``, which MNE applies to all
@@ -51,14 +53,14 @@ def eeg_streams(session: SessionRecord) -> list[Stream]:
 def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") -> "mne.io.RawArray":
     """Return a stream of EEG as MNE's ``Raw``, with the session's events as annotations.
 
-    Samples are as they were recorded. Each event is at the sample that was taken when it happened,
-    by the corrected clock; those outside of the recording are left out. Annotations are called by
-    labels (docs/markers.md). Several are at one sample, so choose those of one name before epochs
-    are made: ``mne.events_from_annotations(raw, regexp="^trial_start/")``. Where samples are
-    missing is ``BAD_gap``. Annotations made in the viewer are ``annotation/`` and their
-    text; a text that begins with ``BAD`` is not prefixed. Faults that monitors reported on a
-    channel are ``fault/`` and their kind, for that channel alone (``ch_names``): the analyst
-    decides which channels are bad.
+    Samples are as they were recorded; missing ones are NaN (0 in channels of triggers), and
+    ``BAD_ACQ_SKIP`` as long as they lasted. Each event is at the sample that was taken when it
+    happened, by the corrected clock; those outside of the recording are left out. Annotations are
+    called by labels (docs/markers.md). Several are at one sample, so choose those of one name
+    before epochs are made: ``mne.events_from_annotations(raw, regexp="^trial_start/")``.
+    Annotations made in the viewer are ``annotation/`` and their text; a text that begins with
+    ``BAD`` is not prefixed. Faults that monitors reported on a channel are ``fault/`` and their
+    kind, for that channel alone (``ch_names``): the analyst decides which channels are bad.
 
     Parameters
     ----------
@@ -85,13 +87,13 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
     signal = sampled(chosen)
     kinds = channel_types(signal, chosen)
     info = mne.create_info(list(signal.labels), signal.rate_hz, list(kinds))
-    scaled = signal.data.T * volts(signal, chosen, unit)[:, None]
-    raw = mne.io.RawArray(scaled, info, verbose="error")
+    scaled = untriggered(signal.data * volts(signal, chosen, unit), kinds)
+    raw = mne.io.RawArray(scaled.T, info, verbose="error")
     started = datetime.fromisoformat(str(session.attrs["started"]))
     zero = session.streams["state"].time[0]
     raw.set_meas_date(started + timedelta(seconds=float(signal.time[0] - zero)))
     onsets, labels = events_at(session, signal)
-    gaps = signal.gaps.astype(np.float64)
+    gaps = signal.holes.astype(np.float64)
     marks = session.annotations
     marks = marks.assign(at=signal.at(marks["time"].to_numpy(float))).dropna(subset="at")
     lengths = (marks["until"] - marks["time"]).to_numpy(float)
@@ -102,11 +104,12 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
     )
     raw.set_annotations(
         mne.Annotations(
-            np.concatenate([onsets, gaps, marks["at"].to_numpy(float), began]) / signal.rate_hz,
+            np.concatenate([onsets, gaps[:, 0], marks["at"].to_numpy(float), began])
+            / signal.rate_hz,
             np.concatenate(
                 [
                     np.zeros(len(onsets)),
-                    np.full(len(gaps), 1.0 / signal.rate_hz),
+                    np.ptp(gaps, axis=1) / signal.rate_hz,
                     lengths,
                     (ended - began) / signal.rate_hz,
                 ]
@@ -147,7 +150,7 @@ def _marked(text: str) -> str:
 
 
 def events_at(session: SessionRecord, signal: Sampled) -> tuple[Any, list[str]]:
-    """Return the samples of events, with fractions, and the events' labels.
+    """Return the rows of events, with fractions, and the events' labels.
 
     Those outside of the recording are left out.
     """
@@ -163,6 +166,16 @@ def channel_types(signal: Sampled, stream: Stream) -> tuple[str, ...]:
     """Return MNE's type of each channel; by default that of its stream."""
     usual = str(stream.attrs.get("type", ""))
     return tuple(KINDS.get((kind or usual).upper(), "misc") for kind in signal.kinds)
+
+
+def untriggered(rows: FloatArray, kinds: Sequence[str]) -> FloatArray:
+    """Set missing samples of channels of triggers to 0, and return the rows.
+
+    MNE converts such channels to whole numbers, and would find a trigger where one is NaN.
+    """
+    stim = np.array(kinds) == "stim"
+    rows[:, stim] = np.nan_to_num(rows[:, stim])
+    return rows
 
 
 def volts(signal: Sampled, stream: Stream, unit: str = "") -> Any:

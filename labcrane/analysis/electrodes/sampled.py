@@ -1,4 +1,4 @@
-"""Sampled signal: a stream as consecutive samples, and the sample of each time."""
+"""Sampled signal: a stream as rows at one rate, and the row of each time."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ LOST = 1.5
 """Sample periods between two samples from which on some between them are missing."""
 
 EVEN = 0.2
-"""Share by which the usual step of dejittered timestamps may miss a period."""
+"""Share by which most steps of dejittered timestamps may miss the usual one."""
 
 SILENT_S = 1.0
 """Seconds without a sample from which on some are missing although timestamps come in bursts."""
@@ -27,10 +27,11 @@ SILENT_S = 1.0
 
 @dataclass(frozen=True)
 class Sampled:
-    """A stream of numbers at a steady rate.
+    """A stream of numbers at a steady rate: one row for each sample that its source took.
 
-    The samples are as they were recorded, none is interpolated. For any behaviour of the
-    source's clock and any missing samples, :meth:`at` gives the sample of a session's time.
+    Row n was taken n / :attr:`measured_hz` after :attr:`start`. The samples are as they were
+    recorded, none is interpolated; a row whose sample never came is NaN in all channels. For any
+    behaviour of the source's clock, :meth:`at` gives the row of a session's time.
 
     Attributes
     ----------
@@ -39,33 +40,54 @@ class Sampled:
     rate_hz
         Samples per second: what the source states, or what was measured where it states none, or
         one that is off by more than a thousandth.
+    measured_hz
+        Samples per second on the session's clock.
+    start
+        Time of row 0 by that rate, in seconds on the session's clock.
     time
-        Of each sample, in seconds on the session's clock, shape ``(n,)``.
-    gaps
-        Numbers of the samples before which some are missing, shape ``(n_gaps,)``.
+        Of each recorded sample, in seconds on the session's clock, shape ``(n,)``.
+    rows
+        Row of each recorded sample, shape ``(n,)``.
     """
 
     labels: tuple[str, ...]
     kinds: tuple[str, ...]
     units: tuple[str, ...]
     rate_hz: float
+    measured_hz: float
+    start: float
     time: FloatArray
-    gaps: npt.NDArray[np.intp]
+    rows: npt.NDArray[np.intp]
     _stream: Stream
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return int(self.rows[-1]) + 1
+
+    @cached_property
+    def holes(self) -> npt.NDArray[np.intp]:
+        """First missing row of each hole, and the row after its last, shape ``(n_holes, 2)``."""
+        last = np.flatnonzero(np.diff(self.rows) > 1)
+        return np.column_stack([self.rows[last] + 1, self.rows[last + 1]])
 
     @cached_property
     def data(self) -> FloatArray:
-        """All samples in the channels' units, shape ``(n, n_channels)``, kept in memory."""
+        """All rows in the channels' units, shape ``(n_rows, n_channels)``, kept in memory."""
         return np.concatenate([np.empty((0, len(self.labels))), *self.pieces()])
 
     def pieces(self, rows: int = CHUNK) -> Iterator[FloatArray]:
-        """Yield :attr:`data` by at most so many samples, which are read from the file then."""
-        for at in range(0, len(self.time), rows):
-            values = self._stream.values(self.labels, at, at + rows)
-            yield np.column_stack([values[name] for name in self.labels]).astype(np.float64)
+        """Yield :attr:`data` by at most so many rows, which are read from the file then."""
+        for at in range(0, len(self), rows):
+            until = min(at + rows, len(self))
+            first, stop = np.searchsorted(self.rows, (at, until)).tolist()
+            values = self._stream.values(self.labels, first, stop)
+            piece = np.full((until - at, len(self.labels)), np.nan)
+            for number, name in enumerate(self.labels):
+                piece[self.rows[first:stop] - at, number] = values[name]
+            yield piece
 
     def at(self, times: FloatArray) -> FloatArray:
-        """Return the samples of times, counted from 0, with fractions.
+        """Return the rows of times, counted from 0, with fractions.
 
         Parameters
         ----------
@@ -75,16 +97,19 @@ class Sampled:
         Returns
         -------
         FloatArray
-            Shape ``(n_times,)``, in samples; NaN before the first and after the last.
+            Shape ``(n_times,)``, in rows; NaN before the first and after the last.
         """
-        numbers = np.arange(len(self.time), dtype=np.float64)
         half = 0.5 / self.rate_hz  # what happened just before the first is at the first
         inside = (times >= self.time[0] - half) & (times <= self.time[-1] + half)
-        return np.where(inside, np.interp(times, self.time, numbers), np.nan)
+        return np.where(inside, np.interp(times, self.time, self.rows), np.nan)
+
+    def off_s(self) -> float:
+        """Return by how many seconds a sample's time misses that of its row, at most."""
+        return float(np.abs(self.time - self.start - self.rows / self.measured_hz).max())
 
 
 def sampled(stream: Stream) -> Sampled:
-    """Return a stream of numbers as samples at a steady rate.
+    """Return a stream of numbers as rows at a steady rate.
 
     Raises
     ------
@@ -105,30 +130,53 @@ def sampled(stream: Stream) -> Sampled:
         )
     time = np.maximum.accumulate(stream.column("time"))
     steps = np.diff(time)
-    rate_hz = _rate(header.rate_hz, steps)
-    if not rate_hz:
+    usual = float(np.median(steps))
+    even = usual > 0.0 and np.mean(np.abs(steps - usual) <= EVEN * usual) > 0.5  # noqa: PLR2004
+    lost = steps > (LOST * usual if even else max(SILENT_S, LOST * usual))
+    if time[0] == time[-1]:
         raise RecordingError(
             f"stream {stream.name!r} states no rate, and its samples all have the same time; "
             "set the rate in the program that sends it"
         )
-    even = abs(float(np.median(steps)) * rate_hz - 1.0) <= EVEN
+    if not steps[~lost].any():  # several at a time, seconds apart
+        lost[:] = False
+    starts = np.concatenate([[0], 1 + np.flatnonzero(lost)])
+    period = _period(time - time[0], starts)
+    rows = _rows(time - time[0], starts, period)
+    beyond = time - period * rows
+    measured_hz, stated = 1.0 / period, header.rate_hz
     return Sampled(
         tuple(numeric),
         tuple(channel.type for channel in header.channels),
         tuple(channel.unit for channel in header.channels),
-        rate_hz,
+        stated if stated and abs(measured_hz / stated - 1.0) <= NOMINAL else measured_hz,
+        measured_hz,
+        float(beyond.min() + beyond.max()) / 2.0,
         time,
-        1 + np.flatnonzero(steps > (LOST / rate_hz if even else SILENT_S)),
+        rows,
         stream,
     )
 
 
-def _rate(stated: float, steps: FloatArray) -> float:
-    """Return the rate in Hz that a source states, if it is about true, or the one measured."""
-    going = steps[steps <= SILENT_S]
-    span, usual = float(going.sum()), float(np.median(steps))
-    measured = len(going) / span if span > 0.0 else 0.0
-    found = [measured, *([1.0 / usual] if usual > 0.0 else [])]
-    if stated and any(abs(rate / stated - 1.0) <= NOMINAL for rate in found):
-        return stated
-    return measured
+def _period(time: FloatArray, starts: npt.NDArray[np.intp]) -> float:
+    """Return the period of the line through the samples between holes, by least squares."""
+    lengths = np.diff(starts, append=len(time))
+    index = np.arange(len(time), dtype=np.float64)
+    index, time = (
+        each - np.repeat(np.add.reduceat(each, starts) / lengths, lengths) for each in (index, time)
+    )
+    return float(index @ time / (index @ index))
+
+
+def _rows(time: FloatArray, starts: npt.NDArray[np.intp], period: float) -> npt.NDArray[np.intp]:
+    """Return the row of each sample: consecutive, and after a hole by the time since the first.
+
+    Counted from the first, what is rounded does not add up over many holes. A hole has a row at
+    least.
+    """
+    least = starts + np.arange(len(starts))
+    due = np.rint(time[starts] / period).astype(np.intp)
+    missing = least - starts + np.maximum.accumulate(due - least)
+    rows: npt.NDArray[np.intp] = np.arange(len(time))
+    rows += np.repeat(missing, np.diff(starts, append=len(time)))
+    return rows
