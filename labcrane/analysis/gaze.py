@@ -10,7 +10,7 @@ to the areas that a view recorded with its pictures (``labcrane.feedback.NAME.ar
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,8 +19,10 @@ import numpy.typing as npt
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.gaze_streams import (
     CHANNEL,
+    MEAN,
     gaze_stream,
-    place,
+    sure_samples,
+    window_gaze,
     window_pictures,
     window_stream,
 )
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SIDES = ("left", "top", "right", "bottom")
+EYES = "gaze_eyes"
 ROUNDING_S = 1e-9
 """Samples that hold for as long as a look lasts make one."""
 
@@ -49,12 +52,15 @@ class Looks:
         Whether the gaze position is known: not in a blink, nor where tracking was lost.
     areas
         Names of all areas that there were, looked at or not, as far as they are known.
+    eyes
+        Eyes that were used: ``left and right``; empty where the stream does not state them.
     """
 
     time: FloatArray
     area: Sequence[str]
     tracked: npt.NDArray[np.bool_]
     areas: Sequence[str]
+    eyes: str = ""
 
     def dwell(self, area: str, start: float, stop: float) -> float:
         """Return for how long ``area`` was looked at from ``start`` to ``stop``, in seconds.
@@ -104,7 +110,9 @@ class Looks:
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
 
 
-def looks(session: SessionRecord, delay_s: float = 0.0, stream: str = "") -> Looks | None:
+def looks(
+    session: SessionRecord, delay_s: float = 0.0, stream: str = "", eye: str = MEAN
+) -> Looks | None:
     """Return a session's gaze, or None without a stream that can be measured.
 
     Parameters
@@ -116,6 +124,8 @@ def looks(session: SessionRecord, delay_s: float = 0.0, stream: str = "") -> Loo
         :func:`looks_on_screen`. With 0, a picture is seen as soon as it is handed to the screen.
     stream
         Name of the gaze stream; the only one by default.
+    eye
+        Of :func:`~labcrane.analysis.gaze_streams.window_gaze`.
     """
     gaze = gaze_stream(session, stream)
     if gaze is None:
@@ -124,20 +134,21 @@ def looks(session: SessionRecord, delay_s: float = 0.0, stream: str = "") -> Loo
         values = gaze.values([CHANNEL])[CHANNEL].tolist()
         names = {value: area_name(value) for value in set(values)}  # each name is kept once
         found = [names[value] for value in values]
-        tracked = np.array([not _is_lost(value) for value in values], bool)
-        return Looks(gaze.time, found, tracked, sorted({*names.values()} - {""}))
+        sure, eyes = sure_samples(session, gaze, eye)
+        tracked = np.array([not _is_lost(value) for value in values], bool) & sure
+        return Looks(gaze.time, found, tracked, sorted({*names.values()} - {""}), eyes)
     pictures = window_pictures(session)
     if pictures is None or not (columns := area_columns(pictures)):
         return None
-    where = gaze.values(place(gaze))
+    where = window_gaze(session, gaze, eye)
     boxes = pictures.values([column for four in columns.values() for column in four])
     things = _things(list(columns))
     areas = {
         things[name]: np.column_stack([boxes[column] for column in four]).astype(np.float64)
         for name, four in columns.items()
     }
-    spots = np.column_stack([where[name] for name in place(gaze)]).astype(np.float64)
-    return looks_on_screen(gaze.time, spots, pictures.time, areas, delay_s)
+    seen = looks_on_screen(gaze.time, where.spots(), pictures.time, areas, delay_s)
+    return replace(seen, eyes=where.called)
 
 
 def area_columns(pictures: Stream) -> dict[str, tuple[str, ...]]:
@@ -304,7 +315,7 @@ FIXATIONS: Mapping[str, tuple[str, str]] = {
     "spread_deg": ("deg", "median distance of samples from their median: the precision"),
     "right_px": ("px", "median offset of gaze from the point, to the right"),
     "down_px": ("px", "median offset of gaze from the point, downwards"),
-    "valid": ("1", "share of the samples that are numbers"),
+    "valid": ("1", "share of the samples in which gaze is known"),
 }
 """Unit and meaning of the columns of :func:`fixations`."""
 
@@ -347,8 +358,8 @@ def fixations(session: SessionRecord, settled_s: float = SETTLED_S) -> "pd.DataF
     One row for each point that was shown for its whole time: ``step`` and ``point``, counted from
     1; ``time`` on our clock, in seconds; ``right_deg``, ``down_deg``, ``deg`` and ``spread_deg`` as
     in :class:`Drift`, NaN where the picture's size or the eye's distance was not given;
-    ``right_px`` and ``down_px``, the median offset in pixels; ``valid``, the share of samples that
-    are numbers. No row without an operator's view, or without exactly one gaze stream in
+    ``right_px`` and ``down_px``, the median offset in pixels; ``valid``, the share of samples in
+    which gaze is known. No row without an operator's view, or without exactly one gaze stream in
     pixels of the window.
 
     Parameters
@@ -364,9 +375,7 @@ def fixations(session: SessionRecord, settled_s: float = SETTLED_S) -> "pd.DataF
     shown = list(_shown(session))
     rows = []
     if gaze is not None and shown:
-        where = gaze.values(place(gaze))
-        spots = np.column_stack([where[name] for name in place(gaze)]).astype(np.float64)
-        time = gaze.time
+        spots, time = window_gaze(session, gaze).spots(), gaze.time
         for point in shown:
             held = (time >= point.began + settled_s) & (time < point.over)
             found = _offset(spots[held], point.at, point.glass)
@@ -556,7 +565,9 @@ def gaze_units(columns: "pd.Index[str]") -> dict[str, tuple[str, str]]:
     """Return unit and meaning of each gaze measure among ``columns``."""
     found = {}
     for name in columns:
-        if name.startswith("gaze_valid_"):
+        if name == EYES:
+            found[name] = ("", "eyes by which gaze was measured; empty where they are not stated")
+        elif name.startswith("gaze_valid_"):
             found[name] = ("1", "share of the time in which the gaze position is known")
         elif name.startswith("dwell_"):
             found[name] = ("s", "gaze on an area of interest; NaN where tracking was lost")

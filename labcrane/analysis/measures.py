@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane.analysis.cohort import Participant
+from labcrane.analysis.gaze import EYES as GAZE_EYES
 from labcrane.analysis.gaze import gaze_measures, looks, with_unseen_areas
+from labcrane.analysis.gaze_streams import EYES, MEAN
 from labcrane.analysis.kinematics.halts import halts
 from labcrane.analysis.kinematics.smoothness import ldlj, low_pass, path_ratio, sparc, sub_movements
 from labcrane.analysis.movements import (
@@ -66,6 +68,9 @@ class MeasureSettings:
         --display`` measures it: which picture was looked at.
     gaze_stream
         Name of the gaze stream, where a session has several that could be measured.
+    gaze_eye
+        Eye that gaze is measured by: ``left``, ``right``, ``best`` (the one that is known in more
+        samples of the session) or ``mean`` (both: gaze is known where one of them is).
     """
 
     dead_zone: float = 0.05
@@ -80,6 +85,11 @@ class MeasureSettings:
     look_least_s: float = 0.066
     display_delay_s: float = 0.0
     gaze_stream: str = ""
+    gaze_eye: str = MEAN
+
+    def __post_init__(self) -> None:
+        if self.gaze_eye not in EYES:
+            raise ValueError(f"there is no gaze_eye {self.gaze_eye!r}; there is {', '.join(EYES)}")
 
     def as_dict(self) -> dict[str, object]:
         """Return the settings by name, ready for JSON."""
@@ -165,7 +175,7 @@ def measure_session(
         return trials
     machine = machine_of(session)
     rate_hz = float(session.attrs["rate_hz"])
-    seen = looks(session, settings.display_delay_s, settings.gaze_stream)
+    seen = looks(session, settings.display_delay_s, settings.gaze_stream, settings.gaze_eye)
     rows, recorded = [], []
     for each in cut(frames, trials, rate_hz) if frames else movements_of(session):
         movement = by_todays_rule(each, session)
@@ -180,6 +190,8 @@ def measure_session(
             )  # fmt: skip
         rows.append(row)
     measured = pd.DataFrame(rows, index=trials.index)
+    if seen is not None and seen.eyes:
+        measured[GAZE_EYES] = seen.eyes
     if measured["measured_anew"].any():
         told = {name: [row.get(name, np.nan) for row in recorded] for name in ANEW}
         there = {name: told[name] for name in ANEW if any(name in row for row in recorded)}

@@ -5,6 +5,7 @@ from .cranes.crane import Crane
 from .cranes.crane_settings import CraneSettings, GrappleSettings, LoadedCraneSettings
 from .cranes.load import LoadedCrane
 from .events import HED_VERSION, name_of
+from .eyes import CONFIDENCE, SHARES, Eye, eyes_of, is_confidence, is_pupil, side_of
 from .findings import Finding, Verdict
 from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .kernel import Kernel, Places
@@ -57,7 +58,9 @@ from .settings import (
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 
 __all__ = [
+    "CONFIDENCE",
     "HED_VERSION",
+    "SHARES",
     "AnswerError",
     "Answers",
     "AtMost",
@@ -72,6 +75,7 @@ __all__ = [
     "Echo",
     "Event",
     "EventName",
+    "Eye",
     "Finding",
     "GrappleSettings",
     "InputAxis",
@@ -110,8 +114,11 @@ __all__ = [
     "Within",
     "WrongKey",
     "compiled",
+    "eyes_of",
     "file_name_of",
     "give_name",
+    "is_confidence",
+    "is_pupil",
     "kernel",
     "look",
     "name_of",
@@ -120,6 +127,7 @@ __all__ = [
     "read_csv_text",
     "read_settings",
     "read_yaml",
+    "side_of",
     "signals_of",
     "unlike",
     "was_run",

@@ -8,14 +8,13 @@ import numpy as np
 
 from labcrane import FloatArray
 from labcrane.analysis import Sampled, eeg_streams, gaze_space, sampled
+from labcrane.core import Eye, eyes_of, side_of
 from labcrane.recording import LOG, SessionRecord, Stream
 from labcrane_bids.files import MISSING, ROWS, first_tick
 from labcrane_bids.settings import BidsSettings
 
 GAZE = "Gaze"
 ON_SCREEN = "gaze-on-screen"
-PUPIL = {"pupil": "pupil_size", "pupil_size": "pupil_size"}
-"""Other channels of gaze for which BIDS has names; all others keep their labels."""
 
 SYSTEMS = {
     "m": "gaze-in-world", "cm": "gaze-in-world", "mm": "gaze-in-world", "meters": "gaze-in-world",
@@ -26,7 +25,6 @@ SYSTEMS = {
 SPACES = {"screen": ON_SCREEN, "scene": "eye-in-head"}
 """Coordinate system of pixels and shares of a picture, by whose picture it is: a scene camera moves
 with the head."""
-
 
 UNSTEADY = "no steady rate"
 
@@ -62,10 +60,13 @@ def continuous_recordings(
         if signal is None or not _is_steady(signal, stream):
             left_out[stream.name, why or UNSTEADY] += 1
             continue
-        gaze = stream.attrs.get("type") == GAZE
-        eyes += gaze
-        name = f"eye{eyes}" if gaze else label(stream.name)
-        yield name, *_recording(stream, signal, zero, settings, gaze=gaze)
+        if stream.attrs.get("type") != GAZE:
+            yield label(stream.name), *_recording(stream, signal, zero, settings)
+            continue
+        found = eyes_of(stream.header.channels) if stream.header is not None else ()
+        for eye in found or (None,):
+            eyes += 1
+            yield f"eye{eyes}", *_recording(stream, signal, zero, settings, eye, found)
 
 
 def _unsampled(stream: Stream) -> str:
@@ -87,49 +88,64 @@ def _is_steady(signal: Sampled, stream: Stream) -> bool:
 
 
 def _recording(
-    stream: Stream, signal: Sampled, zero: float, settings: BidsSettings, *, gaze: bool
+    stream: Stream,
+    signal: Sampled,
+    zero: float,
+    settings: BidsSettings,
+    eye: Eye | None = None,
+    eyes: Sequence[Eye] = (),
 ) -> tuple[Iterator[list[FloatArray]], dict[str, Any]]:
-    place = _place(stream.numeric) if gaze else ()
-    labels = [*place, *(name for name in stream.numeric if name not in place)]
-    names = dict(zip(place, ("x_coordinate", "y_coordinate"), strict=False)) | PUPIL if gaze else {}
-    called = [names.get(name, name) for name in labels]
-    columns = ["timestamp", *called]
+    """Return samples and description of a stream, or of one of its eyes."""
+    names = {} if eye is None else {eye.x: "x_coordinate", eye.y: "y_coordinate"}
+    if eye is not None and eye.pupil is not None:
+        names[eye.pupil] = "pupil_size"
+    others = _others(stream, eye, eyes)
+    chosen = [*names, *(column for column in others if column not in names)]
+    columns = ["timestamp"]
+    for column in chosen:
+        name = names.get(column, signal.labels[column])
+        while name in columns:
+            name += "_recorded"
+        columns.append(name)
     about: dict[str, Any] = {
         "SamplingFrequency": signal.measured_hz,
         "StartTime": signal.start - zero,
         "Columns": columns,
         "Description": f"LSL stream {stream.name}",
-        "PhysioType": "eyetrack" if place else "generic",  # BIDS has no eyes without a place
+        "PhysioType": "generic" if eye is None else "eyetrack",  # BIDS has no eyes without a place
         "Manufacturer": str(stream.attrs.get("source_id", MISSING)) or MISSING,
     }
-    if place:
-        unit = stream.units[place[0]]
+    if eye is not None:
+        unit = signal.units[eye.x]
         by_unit = SYSTEMS.get(unit.lower()) or SPACES.get(gaze_space(stream))
-        about["RecordedEye"] = "cyclopean"
+        about["RecordedEye"] = eye.side or "cyclopean"
         about["SampleCoordinateSystem"] = settings.gaze_system or by_unit or "custom"
         if about["SampleCoordinateSystem"] == "custom":
             said = f"in {unit or 'no stated unit'}; the picture that it refers to is unknown"
             about["SampleCoordinateSystemDescription"] = said
-    units = ["s", *(stream.units[name] or "arbitrary" for name in labels)]
-    for column, unit in zip(columns, units, strict=True):
-        about[column] = {"Description": column.replace("_", " "), "Units": unit}
-    return _samples(signal, zero, labels), about
+    units = ["s", *(signal.units[column] or "arbitrary" for column in chosen)]
+    for name, unit in zip(columns, units, strict=True):
+        about[name] = {"Description": name.replace("_", " "), "Units": unit}
+    return _samples(signal, zero, chosen), about
 
 
-def _place(labels: Sequence[str]) -> tuple[str, ...]:
-    """Return the first x that has its y: ``x`` and ``y``, ``Gaze X`` and ``Gaze Y``."""
-    for name in labels:
-        other = name[:-1] + {"x": "y", "X": "Y"}.get(name[-1:], "")
-        if other in labels and other != name[:-1]:
-            return name, other
-    return ()
+def _others(stream: Stream, eye: Eye | None, eyes: Sequence[Eye]) -> list[int]:
+    """Return the columns of a stream that are of an eye; those of no eye are of the first."""
+    if eye is None or stream.header is None:
+        return list(range(len(stream.units)))
+    known = {each.side for each in eyes}
+    sides = [side_of(channel) for channel in stream.header.channels]
+    return [
+        column
+        for column, side in enumerate(sides)
+        if (side if side in known else eyes[0].side) == eye.side
+    ]
 
 
-def _samples(signal: Sampled, zero: float, labels: list[str]) -> Iterator[list[FloatArray]]:
+def _samples(signal: Sampled, zero: float, columns: list[int]) -> Iterator[list[FloatArray]]:
     """Yield time and channels of all rows, a piece at a time; of a missing one the time alone."""
-    order = [signal.labels.index(name) for name in labels]
     at = 0
     for piece in signal.pieces(ROWS):
         time = np.interp(np.arange(at, at + len(piece)), signal.rows, signal.time)
-        yield [time - zero, *piece.T[order]]
+        yield [time - zero, *piece.T[columns]]
         at += len(piece)

@@ -1,14 +1,11 @@
 """Gaze and pupils of an eye tracker."""
 
-import re
-
 import numpy as np
 
 from labcrane import FloatArray
-from labcrane.core import SignalFault, SignalStream
-from labcrane_signals.channels import word
+from labcrane.core import SHARES, Eye, SignalFault, SignalStream, eyes_of, is_pupil
 from labcrane_signals.settings import GazeSettings
-from labcrane_signals.windows import BoolArray, WindowedMonitor
+from labcrane_signals.windows import WindowedMonitor
 
 MILLIMETRES = {
     "mm": 1.0,
@@ -20,7 +17,6 @@ MILLIMETRES = {
     "meters": 1e3,
     "metres": 1e3,
 }
-SHARES = frozenset({"normalized", "normalised", "norm", "1", "ratio"})
 PIXELS = frozenset({"pixel", "pixels", "px"})
 
 PUPIL_MM = (1.2, 9.5)
@@ -53,25 +49,23 @@ class GazeMonitor(WindowedMonitor):
         self._settings = settings
 
     def knows(self, stream: SignalStream) -> bool:
-        return stream.type.lower() == "gaze" and stream.rate_hz > 0 and bool(_places(stream))
+        return (
+            stream.type.lower() == "gaze" and stream.rate_hz > 0 and bool(eyes_of(stream.channels))
+        )
 
     def begin(self, stream: SignalStream) -> None:
         self.watch(stream, range(len(stream.channels)), NEED)
         self._units = [channel.unit.strip().lower() for channel in stream.channels]
-        self._pairs = _places(stream)
-        self._pupils = [at for at, channel in enumerate(stream.channels) if _is_pupil(at, stream)]
-        self._sure = [
-            at
-            for at, channel in enumerate(stream.channels)
-            if "confidence" in word(channel.label) + word(channel.type)
-        ]
+        self._eyes = eyes_of(stream.channels)
+        self._pupils = [at for at, channel in enumerate(stream.channels) if is_pupil(channel)]
 
     def _judge(self, window: FloatArray) -> list[SignalFault]:
         count = window.shape[1]
         bad = {kind: np.zeros(count, dtype=np.bool_) for kind in NEED}
         text: dict[tuple[str, int], str] = {}
-        for x, y in self._pairs:
-            lost, middle = self._gaze(window, x, y)
+        for eye in self._eyes:
+            x = eye.x
+            lost, middle = self._gaze(window, eye)
             bad["gaze lost"][x] = lost > LOST
             text["gaze lost", x] = ADVICE["gaze lost"].format(lost=100.0 * lost)
             bad["wrong unit"][x] = self._wrong(x, middle)
@@ -92,16 +86,10 @@ class GazeMonitor(WindowedMonitor):
             for at in np.flatnonzero(self._streaks[kind].add(now))
         ]
 
-    def _gaze(self, window: FloatArray, x: int, y: int) -> tuple[float, float]:
+    def _gaze(self, window: FloatArray, eye: Eye) -> tuple[float, float]:
         """Return the share of a window without gaze, and the middle of what gaze there is."""
-        across, down = window[:, x], window[:, y]
-        with np.errstate(invalid="ignore"):
-            none: BoolArray = ~(np.isfinite(across) & np.isfinite(down))
-            none |= (across == down) & ((across == 0.0) | (across == -1.0))  # what trackers write
-            for at in self._sure:
-                none |= ~(window[:, at] >= self._settings.confidence)
-            if self._units[x] in SHARES:  # far off the screen, but not in another unit
-                none |= (np.abs(across - 0.5) > 1.5) & (np.abs(across) < 5.0)  # noqa: PLR2004
+        across, down = window[:, eye.x], window[:, eye.y]
+        none = ~eye.seen(window, self._settings.confidence)
         seen = across[~none]
         frozen = len(seen) > 1 and bool(
             (seen == seen[0]).all() and (down[~none] == down[~none][0]).all()
@@ -134,23 +122,3 @@ class GazeMonitor(WindowedMonitor):
             return False, "does not change at all", middle
         jumps = float((np.abs(np.diff(seen)) * factor > JUMP_MM).mean())
         return False, f"jumps in {100.0 * jumps:.0f} % of samples" if jumps > 0.15 else "", middle  # noqa: PLR2004
-
-
-def _is_pupil(column: int, stream: SignalStream) -> bool:
-    """Whether a channel is a pupil's size; its place in the camera's picture is not."""
-    channel = stream.channels[column]
-    said = word(channel.label) + " " + word(channel.type)
-    return "diameter" in said or "pupilsize" in said
-
-
-def _places(stream: SignalStream) -> list[tuple[int, int]]:
-    """Return the columns of x and y of where each eye, or both, look."""
-    found: dict[str, list[int]] = {"x": [], "y": []}
-    for column, channel in enumerate(stream.channels):
-        kind, label = word(channel.type), word(channel.label)
-        for axis, columns in found.items():
-            by_type = kind in {f"screen{axis}", f"direction{axis}", f"gaze{axis}"}
-            by_label = re.fullmatch(rf"(left|right)?(gaze|screen|por)?{axis}(left|right)?", label)
-            if by_type or (not kind.startswith("pupil") and by_label):
-                columns.append(column)
-    return list(zip(found["x"], found["y"], strict=False))

@@ -5,7 +5,7 @@ from typing import Literal
 from pydantic import PositiveFloat
 
 from labcrane import Machine, Settings
-from labcrane.core import Names
+from labcrane.core import CONFIDENCE, Names
 
 
 class ElectrodeSettings(Settings):
@@ -45,8 +45,9 @@ class GazeSettings(Settings):
     def provides(self, machine: Machine) -> Names:
         return {"stream type": ("Gaze",)}
 
-    confidence: PositiveFloat = 0.3
-    """Confidence, 0 to 1, below which a sample does not count as gaze."""
+    confidence: PositiveFloat = CONFIDENCE
+    """Confidence, 0 to 1, below which a sample does not count as gaze, neither here nor in the
+    measures."""
 
 
 class StickSettings(Settings):

@@ -101,7 +101,12 @@ def gazed(file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same session with eyes at 200 Hz and a view's areas at 60 Hz, in a place of its own."""
     import h5py
 
-    from labcrane.recording.participant_file.columns import write_attributes, write_numbers
+    from labcrane.recording import Channel, StreamHeader
+    from labcrane.recording.participant_file.columns import (
+        write_attributes,
+        write_numbers,
+        write_text,
+    )
 
     folder = tmp_path_factory.mktemp("gazed") / file.parent.name
     shutil.copytree(file.parent, folder)
@@ -111,6 +116,8 @@ def gazed(file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         stream = session.create_group(f"streams/{name}")
         about = {"name": name, "type": kind, "rate_hz": rate_hz, "space": "screen"}
         write_attributes(stream, about)
+        channels = tuple(Channel(label, "px") for label in columns if label != "time")
+        write_text(stream, "header", StreamHeader(name, kind, channels, rate_hz=rate_hz).xml)
         for column in ("time_raw", "time"):
             write_numbers(stream, column, columns["time"], "s")
         data = stream.create_group("data")
@@ -192,7 +199,7 @@ def test_gaze_that_is_named_by_area_needs_no_picture_and_a_session_without_gaze_
 
         def __init__(self) -> None:
             self.attrs, self.name, self.units = {"type": "Gaze"}, "eyes", {"aoi": ""}
-            self.time = np.arange(0.0, 4.0, 0.01)
+            self.time, self.header = np.arange(0.0, 4.0, 0.01), None
 
         def column(self, name: str, first: int, last: int) -> np.ndarray:
             areas = np.where(self.time < 1, 0.0, np.where(self.time < 2, 2.0, np.nan))

@@ -30,6 +30,8 @@ BEGIN = 92.0
 UNSURE_S = 0.1
 """Accuracy of corrected times, as the file states it, from which on nothing can be compared."""
 
+SIDES = {"": "cyclopean", "left": "left", "L": "left", "right": "right", "R": "right"}
+
 STEM = "sub-P001/ses-01/{0}/sub-P001_ses-01_task-acquisition"
 
 
@@ -44,11 +46,23 @@ class Drawn:
     drift: float
     tolerance_s: float
     """By how much the time by header may be off; NaN for a stream without a rate."""
+    eyes: tuple[str, ...]
+    """Sides of the eyes whose place and pupil it has; none but for gaze."""
+
+    @property
+    def labels(self) -> list[str]:
+        """Labels of the channels, in the order of any program."""
+        return ["t", *(f"{eye} {what}".strip() for what in ("Gaze Y", "pupil", "Gaze X")
+                       for eye in self.eyes)]  # fmt: skip
+
+    def value(self, label: str) -> FloatArray:
+        """Return what a channel holds: its own number more than the time."""
+        return self.time - FIRST + 1000.0 * self.labels.index(label)
 
     def write(self, writer: XdfWriter) -> None:
-        channels = tuple(Channel(label, "s") for label in ("t", "x", "y"))
+        channels = tuple(Channel(label, "s") for label in self.labels)
         header = StreamHeader(self.name, self.type, channels, "double64", self.stated_hz, self.name)
-        data = np.column_stack([self.time - FIRST] * 3)
+        data = np.column_stack([self.value(label) for label in self.labels])
         write_stream(writer, header, self.time, 321.0, data, drift=self.drift)
 
 
@@ -56,13 +70,16 @@ def drawn(random: Generator, number: int, end: float) -> Drawn:
     """Return a stream: regular or not, stated rightly or not, with holes and restarts."""
     letters = list("aZ09 _-.é心")
     name = f"é{''.join(random.choice(letters, 4))}{number}"
-    kind = str(random.choice(["EDA", "ECG", "Gaze"]))
+    kind = str(random.choice(["EDA", "ECG", "Gaze", "Gaze"]))
+    eyes: tuple[str, ...] = ()
+    if kind == "Gaze":
+        eyes = [("",), ("left", "right"), ("right",), ("R", "L")][random.integers(4)]
     start = BEGIN + random.uniform(0.0, 20.0)
     drift = random.uniform(-1e-4, 1e-4)
     if number % 4 == 0:  # heartbeats, or an eye's samples as they come
         mean = random.choice([0.8, 0.02])
         steps = mean * np.clip(random.normal(1.0, 0.2, int((end - start) / mean)), 0.2, None)
-        return Drawn(name, kind, 0.0, start + np.cumsum(steps), drift, np.nan)
+        return Drawn(name, kind, 0.0, start + np.cumsum(steps), drift, np.nan, eyes)
     rate = float(np.round(np.exp(random.uniform(np.log(2.0), np.log(300.0))), 3))
     time = np.arange(start, end, 1.0 / rate)
     keep = np.ones(len(time), bool)
@@ -74,7 +91,7 @@ def drawn(random: Generator, number: int, end: float) -> Drawn:
             time[begin:] += random.uniform(0.0, 1.0 / rate)
     stated = rate * float(random.choice([1.0, 1.0, 1.0, 0.5, 1.3]))
     tolerance = 2e-3 + (0.6 / rate if restarts else 0.0)
-    return Drawn(name, kind, stated, time[keep], drift, tolerance)
+    return Drawn(name, kind, stated, time[keep], drift, tolerance, eyes)
 
 
 @dataclass(frozen=True)
@@ -118,8 +135,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     return recorded(tmp_path_factory.mktemp("drawn"), int(default_rng().integers(1 << 30)), 10)
 
 
-def by_header(folder: Path) -> Iterator[tuple[str, FloatArray, pd.DataFrame]]:
-    """Yield stream, times and values of each recording, as BIDS says to read one."""
+def by_header(folder: Path) -> Iterator[tuple[tuple[str, str], FloatArray, pd.DataFrame]]:
+    """Yield stream and eye, times and values of each recording, as BIDS says to read one."""
     for path in folder.rglob("*_physio.json"):
         about = json.loads(path.read_text(encoding="utf-8"))
         table = pd.read_csv(
@@ -127,7 +144,8 @@ def by_header(folder: Path) -> Iterator[tuple[str, FloatArray, pd.DataFrame]]:
             na_values="n/a",
         )  # fmt: skip
         times = about["StartTime"] + np.arange(len(table)) / about["SamplingFrequency"]
-        yield about["Description"].removeprefix("LSL stream "), times, table
+        name = about["Description"].removeprefix("LSL stream ")
+        yield (name, about.get("RecordedEye", "")), times, table
 
 
 def test_every_value_is_at_the_time_of_its_row_and_no_stream_is_lost(made: Recorded) -> None:
@@ -135,17 +153,30 @@ def test_every_value_is_at_the_time_of_its_row_and_no_stream_is_lost(made: Recor
     text = (made.folder / "README").read_text(encoding="utf-8")
     for each in made.streams:
         if np.isnan(each.tolerance_s):
-            assert each.name not in found
+            assert each.name not in {name for name, _ in found}
             assert f"{each.name} (no steady rate; sessions: 1)" in text
             continue
-        times, table = found.pop(each.name, (None, None))
-        if made.session.streams[each.name].attrs["error_p95_s"] > UNSURE_S:
-            continue
-        there = table["t"].notna()
-        np.testing.assert_allclose(table["t"][there], each.time - FIRST, atol=1e-9)
-        assert np.abs(times - table["t"])[there].max() < each.tolerance_s, each
-        assert np.abs(table["timestamp"] - table["t"]).max() < 2e-3
-        assert table["timestamp"].is_monotonic_increasing
+        unsure = made.session.streams[each.name].attrs["error_p95_s"] > UNSURE_S
+        for number, eye in enumerate(each.eyes or (None,)):
+            side = "" if eye is None else SIDES[eye]
+            times, table = found.pop((each.name, side), (None, None))
+            if unsure:
+                continue
+            assert np.abs(table["timestamp"] - times).max() < each.tolerance_s, each
+            assert table["timestamp"].is_monotonic_increasing
+            columns = {"t": "t"} if number == 0 else {}
+            if eye is not None:
+                assert table.columns[1:3].tolist() == ["x_coordinate", "y_coordinate"]
+                columns |= {"x_coordinate": f"{eye} Gaze X".strip(),
+                            "y_coordinate": f"{eye} Gaze Y".strip(),
+                            "pupil_size": f"{eye} pupil".strip()}  # fmt: skip
+            assert set(table) == {"timestamp", *columns}
+            for column, label in columns.items():
+                values = table[column]
+                there = values.notna()
+                np.testing.assert_allclose(values[there], each.value(label), atol=1e-9)
+                moments = values - 1000.0 * each.labels.index(label)
+                assert np.abs(times - moments)[there].max() < each.tolerance_s, each
     assert found == {}
 
 

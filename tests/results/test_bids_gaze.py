@@ -12,7 +12,6 @@ from labcrane.analysis.cohort import find_cohort
 from labcrane.session.commands import FeedbackReady
 from labcrane.testing import ch8
 from labcrane_bids.bids import Bids
-from labcrane_bids.physio import _place
 from labcrane_bids.settings import BidsSettings
 from results.consumers import bids_errors
 from results.recorded import record, study
@@ -85,18 +84,3 @@ def test_of_a_screen_that_is_not_known_nothing_is_said(
     screen = told(folder, "beh", "events")["StimulusPresentation"]
     assert [name for name in screen if name.startswith("Screen")] == ["ScreenOrigin"]
     assert bids_errors(folder) == []
-
-
-@pytest.mark.parametrize(
-    ("labels", "place"),
-    [
-        (["confidence", "x", "y"], ("x", "y")),
-        (["Gaze X", "Gaze Y", "Pupil"], ("Gaze X", "Gaze Y")),
-        (["index", "left_x", "right_x", "left_y", "right_y"], ("left_x", "left_y")),
-        (["aoi", "max"], ()),
-        (["X", "y"], ()),
-        ([""], ()),
-    ],
-)
-def test_a_place_is_the_first_x_that_has_its_y(labels: list[str], place: tuple[str, ...]) -> None:
-    assert _place(labels) == place

@@ -17,7 +17,13 @@ from labcrane.analysis.gaze import (
     area_name,
     looks_on_screen,
 )
-from labcrane.analysis.gaze_streams import CHANNEL, gaze_stream, place, window_pictures
+from labcrane.analysis.gaze_streams import (
+    CHANNEL,
+    gaze_stream,
+    in_window,
+    window_gaze,
+    window_pictures,
+)
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
 from labcrane.types import FloatArray
 
@@ -63,14 +69,16 @@ class Glances:
         self._start = start
         self._gaze = gaze_stream(record)
         self._pictures = window_pictures(record)
-        self._place = () if self._gaze is None else place(self._gaze)
+        self._place = None
+        if self._gaze is not None and in_window(self._gaze):
+            self._place = window_gaze(record, self._gaze)
         self._named = self._gaze is not None and CHANNEL in self._gaze.units
         self._areas = {} if self._pictures is None else area_columns(self._pictures)
 
     @property
     def known(self) -> bool:
         """Whether there is anything to be shown."""
-        return bool(self._place and self._areas) or self._named
+        return bool(self._place is not None and self._areas) or self._named
 
     def at(self, at: float) -> Glance:
         """Return what is seen at a time, in seconds from the film's start."""
@@ -81,9 +89,8 @@ class Glances:
         if self._gaze is not None:
             first, last = np.searchsorted(self._gaze.time, (now - TRAIL_S, now + 1e-9)).tolist()
             fresh = last > first and now - float(self._gaze.time[last - 1]) < STALE_S
-            if fresh and self._place:
-                found = self._gaze.columns(self._place, first, last)
-                trail = np.column_stack([found[name] for name in self._place]).astype(np.float64)
+            if fresh and self._place is not None:
+                trail = self._place.spots(first, last)
             if fresh and self._named:
                 looked = area_name(self._gaze.column(CHANNEL, last - 1, last)[0])
             elif len(trail) and areas:
