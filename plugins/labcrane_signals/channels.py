@@ -39,6 +39,12 @@ NO_SIGNAL = (
 )
 """Words in the label or type of a channel that is not a signal: it may be constant or jump."""
 
+OTHER_TYPES = ("light", "gsr", "eda", "resp", "temp", "accel", "ppg", "aux", "misc")
+"""Words in the type of a channel that is not an electrode, whatever its unit."""
+
+DIODE = ("photo", "diode")
+"""Words in the label or type of a photodiode, which amplifiers call an electrode."""
+
 
 def word(text: str) -> str:
     """Return a label's letters and digits alone, in lower case."""
@@ -57,14 +63,21 @@ def signal_columns(stream: SignalStream) -> list[int]:
 
 
 def electrodes(stream: SignalStream) -> tuple[list[int], list[float]]:
-    """Return the columns that hold voltages, and what one of their units is in microvolts."""
+    """Return the columns of electrodes, and what one of their units is in microvolts."""
     columns, factors = [], []
     for column, channel in enumerate(stream.channels):
         factor = MICROVOLTS.get(channel.unit.strip().lower())
-        if factor is not None and is_signal(channel):
+        if factor is not None and is_signal(channel) and not _is_other_sensor(channel):
             columns.append(column)
             factors.append(factor)
     return columns, factors
+
+
+def _is_other_sensor(channel: SignalChannel) -> bool:
+    label, kind = word(channel.label), word(channel.type)
+    return any(each in kind for each in (*OTHER_TYPES, *DIODE)) or any(
+        each in label for each in DIODE
+    )
 
 
 def labels(stream: SignalStream, columns: Sequence[int]) -> list[str]:

@@ -115,6 +115,29 @@ def eeg_stream(rate: float = 250.0, channels: int = 8, unit: str = "microvolts")
     return SignalStream("Amplifier", "EEG", rate, named)
 
 
+@pytest.mark.parametrize(
+    ("label", "kind"), [("Photodiode", "EEG"), ("D1", "AUX"), ("light", "misc"), ("skin", "GSR")]
+)
+def test_a_sensor_beside_electrodes_gets_no_advice_about_gel(label: str, kind: str) -> None:
+    """A diode sees nothing for 15 s, and then pictures that flicker, in the electrodes' unit."""
+    rng = np.random.default_rng()
+    head = synthetic.a_head(rng, 250.0, 8)
+    scale = synthetic.UNITS[head.unit]
+    seconds = np.arange(30 * 250) / 250.0
+    light = (seconds > 15.0) * 3000.0 * (np.sin(2 * np.pi * 60.0 * seconds) > 0.0)
+    light += 400.0 * rng.standard_normal(len(light)) * (seconds > 20.0)
+    samples = np.column_stack([synthetic.eeg(rng, head, 30.0), light]) * scale
+    channels = (*head.stream.channels, SignalChannel(label, head.unit, kind))
+    known = monitors(SignalStream("Amplifier", "EEG", 250.0, channels))
+    faults = [
+        fault
+        for at in range(0, len(samples), 125)
+        for each in known
+        for fault in each.look(np.empty(125), samples[at : at + 125])
+    ]
+    assert faults == []
+
+
 def test_a_fault_that_ends_is_told_no_more() -> None:
     rng = np.random.default_rng(5)
     head = synthetic.a_head(rng, 250.0, 8)
