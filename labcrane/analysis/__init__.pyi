@@ -18,6 +18,7 @@ from .exporter import Exporter
 from .gaze import Glass, fixations_of, glass_of, with_unseen_areas
 from .gaze_streams import gaze_space
 from .measures import measures_of
+from .monitor_settings import monitor_setting
 from .movements import Movement, events_of, movements_of
 from .presented import PRESENTED, presentation_failed
 from .questionnaires import answers_of, asked_in, beside_trials, scores_of
@@ -50,6 +51,7 @@ __all__ = [
     "glass_of",
     "levels_of",
     "measures_of",
+    "monitor_setting",
     "movements_of",
     "open_dataset",
     "presentation_failed",

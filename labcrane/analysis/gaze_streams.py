@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.analysis.cohort import Participant
+from labcrane.analysis.monitor_settings import monitor_setting
 from labcrane.core.eyes import (
     BOTH,
     CONFIDENCE,
@@ -194,13 +195,8 @@ def _named(sides: Iterable[str]) -> str:
 
 def least_confidence(session: SessionRecord) -> float:
     """Return the confidence below which a sample is not gaze: that of the protocol's monitor."""
-    parts = session.context.get("components", {}).items()
-    stated = [
-        float(choice["settings"]["confidence"])
-        for part, choice in parts
-        if part.startswith("monitors.") and "confidence" in choice.get("settings", {})
-    ]
-    return stated[0] if stated else CONFIDENCE
+    stated = monitor_setting(session, "confidence")
+    return CONFIDENCE if stated is None else float(stated)
 
 
 def _samples(gaze: Stream, start: int = 0, stop: int | None = None) -> FloatArray:

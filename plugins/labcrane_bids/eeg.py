@@ -11,13 +11,14 @@ from labcrane.analysis import (
     Sampled,
     channel_types,
     faults_of,
+    monitor_setting,
     sampled,
     untriggered,
     volts,
 )
 from labcrane.recording import SessionRecord, Stream
 from labcrane_bids.brainvision import write_brainvision
-from labcrane_bids.files import MISSING, first_tick, write_json, write_tsv
+from labcrane_bids.files import DEVICE, MISSING, first_tick, stated_facts, write_json, write_tsv
 from labcrane_bids.settings import BidsSettings
 
 if TYPE_CHECKING:
@@ -26,6 +27,14 @@ if TYPE_CHECKING:
 TYPES = {"eeg": "EEG", "eog": "EOG", "ecg": "ECG", "emg": "EMG", "gsr": "GSR", "resp": "RESP",
          "temperature": "TEMP", "stim": "TRIG", "misc": "MISC"}  # fmt: skip
 """Types of channels in BIDS, by those of MNE."""
+
+FACTS = {
+    **DEVICE,
+    "EEGReference": "reference/label",
+    "CapManufacturer": "cap/manufacturer",
+    "CapManufacturersModelName": "cap/name",
+}
+"""Facts of EEG, by their place in the description of an XDF header."""
 
 COUNTED = {"EEG": "EEG", "EOG": "EOG", "ECG": "ECG", "EMG": "EMG", "TRIG": "Trigger"}
 """Types that a description counts, and in which word; all others are miscellaneous."""
@@ -72,7 +81,9 @@ def write_eeg(
     write_tsv(
         path.with_name(f"{stem}_channels.tsv"), _channels(signal, kinds, units, session, stream)
     )
-    write_json(path.with_name(f"{path.name}.json"), _about(signal, stream, kinds, task, settings))
+    mains_hz = monitor_setting(session, "mains_hz")
+    about = _about(signal, stream, kinds, task, settings, mains_hz)
+    write_json(path.with_name(f"{path.name}.json"), about)
     return signal
 
 
@@ -152,7 +163,12 @@ def _channels(
 
 
 def _about(
-    signal: Sampled, stream: Stream, kinds: list[str], task: str, settings: BidsSettings
+    signal: Sampled,
+    stream: Stream,
+    kinds: list[str],
+    task: str,
+    settings: BidsSettings,
+    mains_hz: float | None,
 ) -> Mapping[str, Any]:
     counts = {f"{word}ChannelCount": kinds.count(kind) for kind, word in COUNTED.items()}
     others = sum(kind not in COUNTED for kind in kinds)
@@ -160,12 +176,13 @@ def _about(
     clock = f"{1000.0 * error:.3f} ms at 95 %" if error == error else "not known"  # noqa: PLR0124
     return {
         "TaskName": task,
-        "EEGReference": settings.eeg_reference or MISSING,
+        "EEGReference": MISSING,
+        **stated_facts(stream, FACTS),
+        **({"EEGReference": settings.eeg_reference} if settings.eeg_reference else {}),
         "SamplingFrequency": signal.rate_hz,
-        "PowerLineFrequency": settings.power_line_hz or MISSING,
+        "PowerLineFrequency": settings.power_line_hz or mains_hz or MISSING,
         "SoftwareFilters": MISSING,
         "HardwareFilters": MISSING,
-        "Manufacturer": str(stream.attrs.get("source_id", "")) or MISSING,
         "RecordingType": "discontinuous" if len(signal.holes) else "continuous",
         "RecordingDuration": len(signal) / signal.rate_hz,
         **counts,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from labcrane import FloatArray
-from labcrane.recording import SessionRecord
+from labcrane.recording import SessionRecord, Stream
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,6 +21,13 @@ MISSING = "n/a"
 
 EYE = re.compile(r"eye\d+", re.IGNORECASE)
 """EntityLabels that BIDS keeps for recordings of eyes."""
+
+DEVICE = {
+    "Manufacturer": "acquisition/manufacturer",
+    "ManufacturersModelName": "acquisition/model",
+    "DeviceSerialNumber": "acquisition/serial_number",
+}
+"""Facts of a device, by their place in the description of an XDF header."""
 
 ROWS = 1 << 16
 """Samples that are in memory at a time."""
@@ -63,6 +70,24 @@ class EntityLabels:
 def first_tick(session: SessionRecord) -> float:
     """Return when a session's first tick was, in seconds on its clock."""
     return float(session.streams["state"].column("time", 0, 1)[0])
+
+
+def stated_facts(stream: Stream, fields: Mapping[str, str]) -> dict[str, str]:
+    """Return what a stream's header states of its device.
+
+    Parameters
+    ----------
+    fields
+        Place of each fact in the header's description: ``acquisition/manufacturer``.
+    """
+    found = {}
+    for name, place in fields.items():
+        here: object = stream.header.desc if stream.header is not None else {}
+        for step in place.split("/"):
+            here = here.get(step, "") if isinstance(here, Mapping) else ""
+        if isinstance(here, str) and here.strip():
+            found[name] = " ".join(here.split())
+    return found
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

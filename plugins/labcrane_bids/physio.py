@@ -10,7 +10,7 @@ from labcrane import FloatArray
 from labcrane.analysis import Sampled, eeg_streams, gaze_space, sampled
 from labcrane.core import Eye, eyes_of, side_of
 from labcrane.recording import LOG, SessionRecord, Stream
-from labcrane_bids.files import MISSING, ROWS, first_tick
+from labcrane_bids.files import DEVICE, ROWS, first_tick, stated_facts
 from labcrane_bids.settings import BidsSettings
 
 GAZE = "Gaze"
@@ -113,7 +113,7 @@ def _recording(
         "Columns": columns,
         "Description": f"LSL stream {stream.name}",
         "PhysioType": "generic" if eye is None else "eyetrack",  # BIDS has no eyes without a place
-        "Manufacturer": str(stream.attrs.get("source_id", MISSING)) or MISSING,
+        **stated_facts(stream, DEVICE),
     }
     if eye is not None:
         unit = signal.units[eye.x]

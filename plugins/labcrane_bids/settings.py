@@ -42,10 +42,12 @@ class BidsSettings(Settings):
     pixels, the protocol or the stream's header states their picture."""
 
     eeg_reference: str = ""
-    """Position of the EEG's reference electrode, as in ``FCz``."""
+    """Position of the EEG's reference electrode, as in ``FCz``; by default what the stream's header
+    states."""
 
     eeg_unit: str = ""
     """Unit of EEG channels whose source states none, as in ``microvolts``."""
 
     power_line_hz: Annotated[NonNegativeFloat, Usual(15.0, 500.0)] = 0.0
-    """Mains frequency where the EEG was recorded, in Hz; 0 if unknown."""
+    """Mains frequency where the EEG was recorded, in Hz; with 0, ``mains_hz`` of the protocol's
+    monitors."""

@@ -19,7 +19,7 @@ from labcrane.types import FloatArray
 from labcrane_bids.bids import Bids
 from labcrane_bids.settings import BidsSettings
 from results.consumers import bids_errors
-from results.recorded import record, study, write_stream
+from results.recorded import STUDY, record, study, write_stream
 
 FIRST = 100.0
 """Time of the session's first tick."""
@@ -31,6 +31,23 @@ UNSURE_S = 0.1
 """Accuracy of corrected times, as the file states it, from which on nothing can be compared."""
 
 SIDES = {"": "cyclopean", "left": "left", "L": "left", "right": "right", "R": "right"}
+
+MONITORED = f"{STUDY}monitors:\n  eeg: {{use: eeg_signal, mains_hz: 60}}\n"
+
+DESCRIBED = {
+    "acquisition": {"manufacturer": "Amps  Ltd", "model": "A64", "serial_number": "17"},
+    "reference": {"label": "TP9"},
+    "cap": {"name": "Cap M", "manufacturer": ""},
+}
+FACTS = {
+    "Manufacturer": "Amps Ltd",
+    "ManufacturersModelName": "A64",
+    "DeviceSerialNumber": "17",
+    "EEGReference": "TP9",
+    "CapManufacturersModelName": "Cap M",
+    "PowerLineFrequency": 60,
+}
+"""What BIDS says of that amplifier."""
 
 STEM = "sub-P001/ses-01/{0}/sub-P001_ses-01_task-acquisition"
 
@@ -118,11 +135,11 @@ def recorded(folder: Path, seed: int, count: int) -> Recorded:
         for at in random.choice(events[5:-5], 3, replace=False):  # events without a sample
             keep[np.abs(time - at - random.uniform(-0.5, 0.5)) < random.uniform(0.6, 3.0)] = False
         channels = (Channel("Cz", "uV", "EEG"), Channel("trigger", "", "Trigger"))
-        header = StreamHeader("amp", "EEG", channels, "double64", rate, "amp")
+        header = StreamHeader("amp", "EEG", channels, "double64", rate, "amp", DESCRIBED)
         data = np.column_stack([time - FIRST, np.zeros(len(time))])
         write_stream(writer, header, time[keep], -55.0, data[keep])
 
-    record(study(folder), folder / "data", "P001", also=write)
+    record(study(folder, MONITORED), folder / "data", "P001", also=write)
     (one,) = find_cohort(folder / "data").included
     out = folder / "bids"
     out.mkdir()
@@ -193,6 +210,8 @@ def whole(made: Recorded, before: float, after: float) -> FloatArray:
 def test_eeg_by_its_header_has_every_event_where_it_was(made: Recorded) -> None:
     folder = made.folder / STEM.format("eeg")
     about = json.loads(Path(f"{folder}_eeg.json").read_text(encoding="utf-8"))
+    assert {name: about[name] for name in FACTS} == FACTS
+    assert "CapManufacturer" not in about
     values = np.fromfile(f"{folder}_eeg.eeg", "<f4").reshape(-1, 2)
     events = pd.read_csv(f"{folder}_events.tsv", sep="\t", na_values="n/a")
     bad = events["trial_type"] == "BAD_ACQ_SKIP"
@@ -232,6 +251,7 @@ def test_mne_makes_epochs_of_whole_data_alone_and_filters_around_holes(
     direct = mne.io.read_raw_brainvision(path.fpath, verbose="error")
     expected = whole(made, 0.2, 0.3)
     assert 0 < len(expected) < len(made.events) - 3
+    assert stored.info["line_freq"] == to_mne(made.session).info["line_freq"] == 60.0
     for raw in (to_mne(made.session), stored, direct):
         raw.load_data(verbose="error")
         events, ids = mne.events_from_annotations(raw, verbose="error")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane.analysis.electrodes.sampled import Sampled, sampled
+from labcrane.analysis.monitor_settings import monitor_setting
 from labcrane.analysis.movements import events_of
 from labcrane.analysis.presented import presentation_failed
 from labcrane.errors import PluginError, RecordingError, nearest
@@ -61,6 +62,7 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
     Annotations made in the viewer are ``annotation/`` and their text; a text that begins with
     ``BAD`` is not prefixed. Faults that monitors reported on a channel are ``fault/`` and their
     kind, for that channel alone (``ch_names``): the analyst decides which channels are bad.
+    ``info["line_freq"]`` is the ``mains_hz`` of the protocol's monitors.
 
     Parameters
     ----------
@@ -87,6 +89,8 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
     signal = sampled(chosen)
     kinds = channel_types(signal, chosen)
     info = mne.create_info(list(signal.labels), signal.rate_hz, list(kinds))
+    if (mains_hz := monitor_setting(session, "mains_hz")) is not None:
+        info["line_freq"] = float(mains_hz)
     scaled = untriggered(signal.data * volts(signal, chosen, unit), kinds)
     raw = mne.io.RawArray(scaled.T, info, verbose="error")
     started = datetime.fromisoformat(str(session.attrs["started"]))
