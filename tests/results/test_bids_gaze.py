@@ -62,6 +62,14 @@ def test_gaze_has_its_place_first_and_says_in_which_system(bids: Path) -> None:
 
 
 @pytest.mark.slow
+def test_logs_of_views_are_not_physio_and_the_readme_says_so(bids: Path) -> None:
+    found = [path.name.split("_recording-")[1] for path in bids.rglob("*_physio.json")]
+    assert sorted(found) == [f"eye{number}_physio.json" for number in (1, 2, 3)]
+    text = (bids / "README").read_text(encoding="utf-8")
+    assert "labcrane.feedback.cab.areas (a log of labcrane; sessions: 1)" in text
+
+
+@pytest.mark.slow
 def test_events_are_beside_gaze_and_say_what_the_screen_was(bids: Path) -> None:
     events = [pd.read_csv(bids / f"{STEM.format(kind, 'events')}.tsv", sep="\t")
               for kind in ("motion", "beh")]  # fmt: skip
