@@ -97,7 +97,7 @@ def drawn(random: Generator, number: int, end: float) -> Drawn:
         mean = random.choice([0.8, 0.02])
         steps = mean * np.clip(random.normal(1.0, 0.2, int((end - start) / mean)), 0.2, None)
         return Drawn(name, kind, 0.0, start + np.cumsum(steps), drift, np.nan, eyes)
-    rate = float(np.round(np.exp(random.uniform(np.log(2.0), np.log(300.0))), 3))
+    rate = float(np.round(np.exp(random.uniform(np.log(2.0), np.log(120.0))), 3))
     time = np.arange(start, end, 1.0 / rate)
     keep = np.ones(len(time), bool)
     restarts = bool(random.integers(2))
@@ -129,7 +129,7 @@ def recorded(folder: Path, seed: int, count: int) -> Recorded:
         for each in streams:
             each.write(writer)
         times.append(events)
-        rate = float(random.integers(100, 500))
+        rate = float(random.integers(100, 250))
         time = np.arange(events[0] + 2.0, events[-1] - 2.0, 1.0 / rate)
         keep = np.ones(len(time), bool)
         for at in random.choice(events[5:-5], 3, replace=False):  # events without a sample
