@@ -23,7 +23,7 @@ def test_a_minimum_jerk_movement_has_its_closed_forms(tmp_path) -> None:
     assert first["sub_movements"] == 1
     assert first["limit_hits"] == 0
     assert first["simultaneous"] == pytest.approx(first["bimanual"], abs=0.2)
-    _, session = next(make_participant(tmp_path / "..", "P002").sessions())
+    _, session = next(make_participant(tmp_path, "P002").sessions())
     movement = next(iter(cut(groups(session), session.trials, 100.0)))
     x, y, _ = movement.tip[0]
     radius = math.hypot(x - machine_of(session).base_x, y)
