@@ -54,6 +54,8 @@ class Participant:
         The reason for the status, in words.
     kind
         Simulated or pilot, whether half-finished or not; None for a person's data.
+    study
+        Name of the study that the file is of; empty where it is not known.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Participant:
     status: Status
     why: str
     kind: Status | None = field(default=None, kw_only=True)
+    study: str = field(default="", kw_only=True)
 
     @property
     def needs(self) -> frozenset[Status]:
@@ -175,7 +178,7 @@ def find_cohort(
     ProtocolError
         ``include`` names something else.
     RecordingError
-        There is no such folder, or no usable participant is left.
+        There is no such folder, no usable participant is left, or they are of several studies.
     """
     wanted = {Status.COMPLETE, *(_includable(word) for word in include)}
     people = everyone(folder, struck)
@@ -183,6 +186,12 @@ def find_cohort(
     left_out = tuple(person for person in people if not person.needs <= wanted)
     if not included:
         raise RecordingError(_nobody(folder, left_out))
+    if len(studies := {person.study: person.name for person in included}) > 1:
+        found = " and ".join(f"{study!r} (as of {name})" for study, name in studies.items())
+        raise RecordingError(
+            f"{folder} holds recordings of {len(studies)} studies, {found}, which are not one "
+            "cohort: give each study a data folder of its own"
+        )
     return Cohort(folder, included, left_out)
 
 
@@ -263,6 +272,12 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
         if behind := backlog(path):
             return Participant(folder.name, path, Status.UNREADABLE, "; ".join(behind.values()))
         recording = Recording(path)
+        if recording.participant != folder.name:
+            why = (
+                f"says that it is of {recording.participant}: a copy, or in the wrong folder; "
+                f"remove it, or name its folder {recording.participant}"
+            )
+            return Participant(folder.name, path, Status.UNREADABLE, why)
         if not recording.sessions:
             return Participant(folder.name, path, Status.UNREADABLE, "holds no session")
         hollow = [_hollow(number, recording.session(number)) for number in recording.sessions]
@@ -273,7 +288,9 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
         raise
     except (RecordingError, ProtocolError) as error:  # of the file, of the protocol in it
         return Participant(folder.name, path, Status.UNREADABLE, str(error))
-    return Participant(folder.name, path, status, why, kind=kind)
+    return Participant(
+        folder.name, path, status, why, kind=kind, study=str(recording.attrs["study"])
+    )
 
 
 def _hollow(number: int, session: SessionRecord) -> str | None:

@@ -8,6 +8,7 @@ import pytest
 from labcrane import ProtocolError, RecordingError
 from labcrane.analysis.cohort import Cohort, Status, find_cohort
 from labcrane.cli.app import main
+from results.recorded import STUDY, record, study
 
 
 def test_only_complete_participants_are_included(cohort: Cohort) -> None:
@@ -31,6 +32,37 @@ def test_everybody_else_is_listed_with_a_reason(cohort: Cohort) -> None:
     assert listing.loc["P001-PILOT", "why"] == "session 1 is stamped pilot"
     assert "labcrane recover" in listing.loc["P007", "why"]
     assert set(listing.loc[["P003", "P006"], "included"]) == {"no"}
+
+
+@pytest.mark.parametrize("name", ["P004", "P001-PILOT", "P00l", "Copy of P001"])
+def test_a_copy_under_another_name_is_left_out_and_named(
+    data: Path, tmp_path: Path, name: str
+) -> None:
+    """It counted as a second person, though the file says whose it is."""
+    shutil.copytree(data / "P001", tmp_path / "data" / "P001")
+    shutil.copytree(data / "P002", tmp_path / "data" / "P002")
+    shutil.copytree(data / "P001", tmp_path / "data" / name)
+    (tmp_path / "data" / name / "P001.h5").rename(tmp_path / "data" / name / f"{name}.h5")
+    found = find_cohort(tmp_path / "data")
+    assert [person.name for person in found.included] == ["P001", "P002"]
+    (copy,) = found.unreadable
+    assert copy.name == name
+    assert copy.why == (
+        "says that it is of P001: a copy, or in the wrong folder; remove it, or name its "
+        "folder P001"
+    )
+
+
+def test_people_of_two_studies_are_not_pooled(data: Path, tmp_path: Path) -> None:
+    shutil.copytree(data / "P001", tmp_path / "data" / "P001")
+    other = tmp_path / "other"
+    other.mkdir()
+    record(study(other, STUDY.replace("study: ", "study: another_", 1)), tmp_path / "data", "P002")
+    with pytest.raises(RecordingError) as refused:
+        find_cohort(tmp_path / "data")
+    assert "holds recordings of 2 studies" in str(refused.value)
+    assert "(as of P001) and 'another_" in str(refused.value)
+    assert "give each study a data folder of its own" in str(refused.value)
 
 
 def test_others_are_included_by_their_status(data: Path) -> None:
