@@ -222,10 +222,7 @@ def names(planned: PlannedTest) -> list[str]:
     factors, results, measure = planned.factors, planned.results, planned.effect.measure
     match planned.kind:
         case "anova":
-            found = [
-                outcomes.named(test, factors) for test in outcomes.tests(results, measure, factors)
-            ]
-            return list(dict.fromkeys(found))
+            return [test.factor for test in outcomes.tests(results, measure, factors)]
         case "contrast":
             there = [*factors.between, *factors.over_phases, DISTANCE]
             there += [CONDITION] * bool(factors.conditions)
@@ -252,7 +249,7 @@ def ask(planned: PlannedTest, results: "pd.DataFrame") -> ReportedTest:
 
 def _anova(planned: PlannedTest, results: "pd.DataFrame") -> ReportedTest:
     for test in outcomes.tests(results, planned.effect.measure, planned.factors):
-        if outcomes.named(test, planned.factors) == planned.effect.factor:
+        if test.factor == planned.effect.factor:
             return ReportedTest(test.p_gg)
     return NOTHING
 

@@ -11,10 +11,12 @@ from statsmodels.stats.anova import AnovaRM
 
 from labcrane.analysis.report import outcomes
 from labcrane.analysis.report.factors import factors_of, with_factors
-from labcrane.analysis.report.words import STYLES, Results, paragraphs
+from labcrane.analysis.report.findings import Results, of_scores
+from labcrane.analysis.report.words import STYLES, paragraphs
 from labcrane.cli.app import main
 from labcrane.simulation.power import Claim, read_effect
 from labcrane.simulation.reported import ask, plan_test
+from results import tested
 from results.undrawn import without_figures
 
 EFFECT = 0.6
@@ -60,12 +62,12 @@ def test_two_conditions_are_compared_as_a_paired_test_does_and_the_effect_is_fou
     movements = crossover(seed, 16, ("plain", "tone"))
     means = movements.groupby(["participant", "condition"])["movement_time"].mean().unstack()
     theirs = ttest_rel(means["plain"], means["tone"])
-    anova = of_condition(outcomes.anova_table, movements)
+    anova = of_condition(tested.anova_table, movements)
     assert anova["f"] == pytest.approx(theirs.statistic**2)
     assert (anova["df1"], anova["df2"], anova["n"]) == (1, 15, 16)
     assert anova["p"] == pytest.approx(theirs.pvalue)
     assert not anova["confounded"]
-    contrast = of_condition(outcomes.contrast_table, movements)
+    contrast = of_condition(tested.contrast_table, movements)
     assert contrast["difference"] == pytest.approx((means["plain"] - means["tone"]).mean())
     low, high = theirs.confidence_interval(0.95)
     assert (contrast["ci_low"], contrast["ci_high"]) == pytest.approx((low, high))
@@ -81,7 +83,7 @@ def test_three_conditions_are_tested_as_statsmodels_does() -> None:
         .fit()
         .anova_table.iloc[0]
     )
-    ours = of_condition(outcomes.anova_table, movements)
+    ours = of_condition(tested.anova_table, movements)
     assert (ours["f"], ours["p"]) == pytest.approx((theirs["F Value"], theirs["Pr > F"]))
     assert (ours["df1"], ours["df2"]) == (2, 34)
 
@@ -89,15 +91,15 @@ def test_three_conditions_are_tested_as_statsmodels_does() -> None:
 def test_who_lacks_a_condition_is_left_out_by_name() -> None:
     movements = crossover(2, 10, ("plain", "tone"))
     gone = (movements["participant"] == "P003") & (movements["condition"] == "tone")
-    ours = of_condition(outcomes.anova_table, movements[~gone])
+    ours = of_condition(tested.anova_table, movements[~gone])
     assert (ours["n"], ours["left_out"]) == (9, "P003")
 
 
 def test_conditions_in_one_order_for_everybody_cannot_be_told_from_it() -> None:
     alike = crossover(2, 10, ("plain", "tone"), balanced=False)
     said = "the order in which conditions came"
-    assert of_condition(outcomes.anova_table, alike)["confounded"] == said
-    assert of_condition(outcomes.contrast_table, alike)["confounded"] == said
+    assert of_condition(tested.anova_table, alike)["confounded"] == said
+    assert of_condition(tested.contrast_table, alike)["confounded"] == said
 
 
 def test_three_conditions_of_people_who_all_had_one_order_are_confounded_whoever_else_began() -> (
@@ -107,9 +109,9 @@ def test_three_conditions_of_people_who_all_had_one_order_are_confounded_whoever
     turned = movements["participant"].str[1:].astype(int) % 3 > 0
     movements = movements[~(turned & (movements["block"] == 3))]  # they did not come to the end
     said = "the order in which conditions came"
-    row = of_condition(outcomes.anova_table, movements)
+    row = of_condition(tested.anova_table, movements)
     assert (row["n"], row["confounded"]) == (3, said)
-    contrasts = outcomes.contrast_table(movements, factors_of(movements))
+    contrasts = tested.contrast_table(movements, factors_of(movements))
     own = contrasts[contrasts["factor"] == "condition"]
     assert set(own["confounded"]) == {said}
 
@@ -117,9 +119,9 @@ def test_three_conditions_of_people_who_all_had_one_order_are_confounded_whoever
 def test_what_comes_with_each_block_in_everybody_is_named_beside_its_change() -> None:
     alike = crossover(2, 10, ("plain", "tone"), balanced=False)
     factors = factors_of(alike)
-    of_blocks = outcomes.anova_table(alike, factors).set_index("factor")
+    of_blocks = tested.anova_table(alike, factors).set_index("factor")
     assert of_blocks.loc["block", "confounded"] == "conditions"
-    contrasts = outcomes.contrast_table(alike, factors).set_index("factor")
+    contrasts = tested.contrast_table(alike, factors).set_index("factor")
     assert contrasts.loc["block", "confounded"] == "conditions"
     scales, _ = outcomes.time_scale_tables(alike, factors)
     change = scales[(scales["quantity"] == "change") & (scales["measure"] == "movement_time")]
@@ -127,7 +129,7 @@ def test_what_comes_with_each_block_in_everybody_is_named_beside_its_change() ->
     slope = scales[scales["quantity"] == "slope"]
     assert set(slope["confounded"]) == {""}
     even = crossover(2, 10, ("plain", "tone"))
-    rows = outcomes.anova_table(even, factors_of(even)).set_index("factor")
+    rows = tested.anova_table(even, factors_of(even)).set_index("factor")
     assert rows.loc["block", "confounded"] == ""
     wide = crossover(5, 8, ("plain",))
     longer = wide["movement_time"] + np.random.default_rng(5).normal(1.0, 0.2, len(wide))
@@ -135,7 +137,7 @@ def test_what_comes_with_each_block_in_everybody_is_named_beside_its_change() ->
     narrow = narrow.assign(movement_time=longer)
     both = pd.concat([wide.assign(width=0.8, feedback="none"), narrow], ignore_index=True)
     both = with_factors(both.drop(columns=["condition", "phase", "place"]))
-    rows = outcomes.anova_table(both, factors_of(both)).set_index("factor")
+    rows = tested.anova_table(both, factors_of(both)).set_index("factor")
     said = "feedback and the targets' distance and the targets' width"
     assert rows.loc["block", "confounded"] == said
 
@@ -159,7 +161,7 @@ def test_a_score_is_tested_over_conditions_as_a_paired_test_does() -> None:
     people = dict.fromkeys(sorted(set(movements["participant"])), "")
     scores = outcomes.with_conditions(asked_after(movements, 4), movements)
     scores = scores[(scores["participant"] != "P003") | (scores["condition"] == "plain")]
-    tests = outcomes.score_tests(scores, people).set_index("factor")
+    tests = tested.score_tests(scores, people).set_index("factor")
     first = scores[scores["step"] < 5.0]
     means = first.pivot_table(values="value", index="participant", columns="condition").dropna()
     theirs = ttest_rel(means["plain"], means["tone"])
@@ -171,9 +173,22 @@ def test_a_score_is_tested_over_conditions_as_a_paired_test_does() -> None:
     np.testing.assert_allclose(table["mean"], means.mean())
     alike = crossover(3, 13, ("plain", "tone"), balanced=False)
     scores = outcomes.with_conditions(asked_after(alike, 4), alike)
-    tests = outcomes.score_tests(scores, people).set_index("factor")["confounded"]
+    tests = tested.score_tests(scores, people).set_index("factor")["confounded"]
     said = "the order in which conditions came"
     assert (tests["condition"], tests["occasion"]) == (said, "conditions")
+
+
+def test_who_is_alone_in_a_group_is_named_beside_the_test_of_scores_over_conditions() -> None:
+    movements = crossover(3, 13, ("plain", "tone"))
+    names = sorted(set(movements["participant"]))
+    people = dict(zip(names, [*"ab" * 6, "c"], strict=True))
+    scores = outcomes.with_conditions(asked_after(movements, 4), movements)
+    factors = factors_of(movements, people)
+    (finding,) = (one for one in of_scores(scores, factors) if one.columns == ("condition",))
+    assert (finding.test.n, set(people) - set(finding.test.people)) == (12, {names[-1]})
+    assert [(one.without, one.whole, one.why) for one in finding.short] == [
+        (names[-1], 12, "alone in group c")
+    ]
 
 
 def test_a_score_that_was_asked_once_at_the_end_is_not_tested_over_conditions() -> None:
@@ -181,7 +196,7 @@ def test_a_score_that_was_asked_once_at_the_end_is_not_tested_over_conditions() 
     people = dict.fromkeys(sorted(set(movements["participant"])), "")
     scores = outcomes.with_conditions(asked_after(movements, 4), movements)
     scores = scores[scores["step"] == 5.0]
-    assert outcomes.score_tests(scores, people).empty
+    assert tested.score_tests(scores, people).empty
     assert outcomes.condition_scores(scores, people).empty
 
 
@@ -202,9 +217,7 @@ def test_orders_that_were_not_had_equally_often_are_told_with_their_numbers(peop
 
 def test_uneven_orders_are_told_beside_the_sample() -> None:
     factors = factors_of(crossover(6, 7, ("a", "b_1", "c")))
-    nothing = pd.DataFrame()
-    counts = pd.DataFrame({"trials": [1], "time_outs": [0], "others": [0]})
-    results = Results("Seven people.", *[nothing] * 6, counts, factors, 7, nothing)
+    results = Results("Seven people.", tested.COUNTS, factors)
     said = "in 1 b1, a for 3, b\\_1 for 2 and c for 2 participants"
     assert said in paragraphs(results, STYLES["tex"])[0]
 
@@ -226,7 +239,7 @@ def test_power_tests_the_difference_of_conditions_as_the_report_does() -> None:
     effect = read_effect("movement_time~condition[plain,tone]")
     planned = plan_test("contrast", effect, movements, Claim("difference"))
     answer = ask(planned, planned.results)
-    reported = of_condition(outcomes.contrast_table, movements)
+    reported = of_condition(tested.contrast_table, movements)
     assert abs(answer.estimate) == pytest.approx(abs(reported["difference"]))
     assert answer.p == pytest.approx(reported["p"])
 

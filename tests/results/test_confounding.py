@@ -8,9 +8,11 @@ import pandas as pd
 import pytest
 
 from labcrane.analysis.report.answer import _effects
-from labcrane.analysis.report.words import STYLES, Results, paragraphs
+from labcrane.analysis.report.findings import Results
+from labcrane.analysis.report.words import STYLES, paragraphs
 from labcrane.analysis.statistics.confounding import told_apart
 from results.test_shortfalls import drawn, found, in_words
+from results.tested import scales_in
 
 __all__ = ["found"]
 
@@ -54,11 +56,11 @@ def test_of_one_order_for_everybody_no_number_is_called_adjusted_or_an_effect_al
     found: Found, seed: int
 ) -> None:
     results, page = found(in_orders(seed, 6, orders=1))
-    rows = results.anova.set_index("factor")["confounded"]
+    rows = results.table("anova").set_index("factor")["confounded"]
     assert rows["sequence"] == "pairs of targets"
     assert set(rows[["distance", "far_side", "distance:far_side"]]) == {"positions"}
-    assert set(results.contrasts["confounded"]) == {"positions"}
-    assert set(results.trends["confounded"]) == {"pairs of targets"}
+    assert set(results.table("contrasts")["confounded"]) == {"positions"}
+    assert set(results.table("trends")["confounded"]) == {"pairs of targets"}
     said = in_words(results)
     assert said.count(TAKEN) == 1
     assert (
@@ -94,7 +96,7 @@ def test_of_orders_of_ones_own_everything_is_told_apart_and_called_as_it_was_tes
     found: Found, seed: int
 ) -> None:
     results, page = found(drawn(seed, (9,), sessions=1))
-    assert set(results.anova["confounded"]) == {""}
+    assert set(results.table("anova")["confounded"]) == {""}
     said = in_words(results)
     assert "cannot be distinguished from" not in said + page
     assert f"over sequence {TAKEN}, F(" in said
@@ -107,8 +109,8 @@ def test_of_orders_of_ones_own_everything_is_told_apart_and_called_as_it_was_tes
 def test_of_one_pair_of_targets_nothing_is_called_adjusted(found: Found) -> None:
     table = drawn(4, (6,), sessions=1)
     results, page = found(table.assign(pair="2 left", distance=2.0, far_side="left"))
-    assert "sequence" in set(results.anova["factor"])
-    assert not results.anova["factor"].str.contains("taken away").any()
+    assert "sequence" in set(results.table("anova")["factor"])
+    assert not results.table("anova")["factor"].str.contains("taken away").any()
     assert TAKEN not in "".join(paragraphs(results, STYLES["html"]))
     assert "Pairs of targets come" not in page
 
@@ -121,7 +123,7 @@ def test_two_orders_that_mirror_each_other_tell_a_trend_and_not_each_position(
     table["sequence"] = table["sequence"].mask(other, 7 - table["sequence"])
     assert not told_apart(table, ["sequence"], [["participant"], ["pair"]])
     results, _ = found(table)
-    scales = results.scales.set_index("quantity")
+    scales = scales_in(results).set_index("quantity")
     assert scales.loc["slope", "adjustment"] == TAKEN.removeprefix("with ")
     assert np.isfinite(scales.loc["slope", "t"])
 
@@ -137,7 +139,7 @@ def test_a_factor_of_which_each_did_a_chance_part_is_said_not_to_be_tested(
     assert not had.any()
     results, page = found(part)
     said = in_words(results)
-    assert "distance" not in set(results.anova["factor"])
+    assert "distance" not in set(results.table("anova")["factor"])
     for text in (said, page):
         assert "0 of 7 people have a value in every cell of distance, and 3 are needed" in text
 

@@ -10,10 +10,10 @@ from simple_crane import CRANE
 from labcrane.analysis.cohort import find_cohort
 from labcrane.analysis.quality import is_result
 from labcrane.analysis.report.factors import factors_of, with_factors
-from labcrane.analysis.report.outcomes import anova_table
 from labcrane.analysis.report.report import write_report
 from labcrane.cli.app import main
 from results.consumers import needs_emmeans, needs_r, r, table
+from results.tested import anova_table
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(900)]
 

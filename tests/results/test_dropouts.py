@@ -13,9 +13,10 @@ from labcrane.analysis.quality import is_result
 from labcrane.analysis.report import figures, outcomes
 from labcrane.analysis.report.answer import _effects, _untested
 from labcrane.analysis.report.factors import factors_of, running, with_factors
-from labcrane.analysis.report.words import Results
+from labcrane.analysis.report.findings import Results, of_outcomes
 from results.consumers import needs_r, r, table
 from results.test_shortfalls import drawn, found, given_up, in_words
+from results.tested import COUNTS, scales_in, score_tests
 
 __all__ = ["found"]
 
@@ -126,13 +127,17 @@ def test_who_is_missing_is_named_with_why_and_in_every_table(
         "recorded in 2 retention." in said
     )
     assert "Every planned test was made" not in page
-    tables = (results.anova, results.contrasts, results.trends, results.scales)
+    tables = (
+        results.table("anova"),
+        results.table("contrasts"),
+        results.table("trends"),
+        scales_in(results),
+    )
     people = movements["participant"].nunique()
     for each in tables:
         counted = each["left_out"].str.split().str.len()
-        own = each[each["group"] == "all"] if "quantity" in each else each
-        assert (own["n"] + counted[own.index] == people).all()
-    assert set(results.contrasts["left_out"]) == {" ".join(gone)}
+        assert (each["n"] + counted == people).all()
+    assert set(results.table("contrasts")["left_out"]) == {" ".join(gone)}
 
 
 def test_trends_contrasts_and_time_scales_are_of_the_rows_that_they_say(
@@ -155,7 +160,7 @@ def test_trends_contrasts_and_time_scales_are_of_the_rows_that_they_say(
         )[:1]
         assert f"t({n - 1}) = {test.statistic:.2f}".replace("-", "\N{MINUS SIGN}") in sentence
         assert (f", n = {n} of {people} people" in sentence) == (n < people)
-    contrasts = results.contrasts[results.contrasts["factor"] == "session"]
+    contrasts = results.table("contrasts")[results.table("contrasts")["factor"] == "session"]
     (row,) = contrasts[contrasts["at"] == ""].to_dict("records")
     cells = whole[whole["participant"].isin(stays)].groupby(["participant", "group", "phase"])
     wide = cells["movement_time"].mean().unstack().reset_index()
@@ -163,7 +168,9 @@ def test_trends_contrasts_and_time_scales_are_of_the_rows_that_they_say(
     wanted = wide.groupby("group")["difference"].mean().mean()  # groups alike, as afex has them
     assert row["difference"] == pytest.approx(wanted, rel=1e-9)
     assert row["n"] == len(stays)
-    scales = results.scales[results.scales["group"] == "all"].set_index(["phase", "quantity"])
+    scales = scales_in(results)[scales_in(results)["group"] == "all"].set_index(
+        ["phase", "quantity"]
+    )
     assert scales.loc[("1 acquisition", "slope"), "n"] == people
     assert set(scales.loc["2 retention", "n"]) == {len(stays)}
 
@@ -175,7 +182,8 @@ def test_the_means_of_a_figure_are_of_those_tested_and_its_lines_of_everybody(
     whole = with_factors(movements)
     factors = factors_of(whole)
     results = whole[is_result(whole)]
-    tested = outcomes.tested(results, "movement_time", factors)
+    findings = list(of_outcomes(results, results, factors))
+    tested = Results("", COUNTS, factors, findings).in_positions(results, "movement_time")
     assert sorted(tested["participant"].unique()) == stays
     shown = running(results, factors)
     drawing = figures.by_sequence(shown, "movement_time", running(tested, factors))
@@ -245,6 +253,6 @@ def test_scores_tell_those_tested_beside_all_who_answered(seed: int) -> None:
             np.testing.assert_allclose(row["mean"], all_of_it.mean())
             if len(whole):
                 np.testing.assert_allclose(row["mean_tested"], whole.mean())
-    for test in outcomes.score_tests(scores, people).to_dict("records"):
+    for test in score_tests(scores, people).to_dict("records"):
         assert test["left_out"].split() == sorted(gone)
         assert test["n"] == 9 - len(gone)

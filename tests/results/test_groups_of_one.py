@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import f_oneway
 
 from labcrane.analysis.report.answer import _effects
-from labcrane.analysis.report.words import Results
+from labcrane.analysis.report.findings import Results
 from labcrane.analysis.statistics.mixed import mixed_model
 from results.test_shortfalls import drawn, found, in_words
 
@@ -27,7 +27,7 @@ def test_who_is_alone_in_a_group_is_in_no_test_and_named_with_why(
     table["group"] = table["group"].replace("c", last)
     gone = sorted(table.loc[table["group"] == last, "participant"].unique())
     results, _ = found(table)
-    (row,) = results.anova[results.anova["factor"] == "group"].to_dict("records")
+    (row,) = results.table("anova")[results.table("anova")["factor"] == "group"].to_dict("records")
     means = table[table["group"] != last].groupby(["group", "participant"])["movement_time"].mean()
     theirs = f_oneway(means["a"], means["b"])
     assert (row["f"], row["p"]) == pytest.approx((theirs.statistic, theirs.pvalue))
@@ -42,9 +42,9 @@ def test_who_is_alone_in_a_group_is_in_no_test_and_named_with_why(
 def test_two_groups_of_which_one_is_one_person_are_not_compared(found: Found) -> None:
     table = drawn(4, (11, 1), sessions=2)
     results, _ = found(table)
-    assert not results.anova["factor"].str.contains("group").any()
-    assert not len(results.contrasts) or "group" not in set(results.contrasts["factor"])
-    assert set(results.anova["left_out"]) == {"P012"}
+    assert not results.table("anova")["factor"].str.contains("group").any()
+    assert not any(one.table == "contrasts" and one.effect == "group" for one in results.findings)
+    assert set(results.table("anova")["left_out"]) == {"P012"}
     words = in_words(results)
     assert "Not tested over group" in words
     assert "in group a" in words

@@ -13,6 +13,7 @@ from labcrane.analysis.report import outcomes
 from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.statistics.anova import analyse
 from labcrane.analysis.statistics.mixed import NoModelError, mixed_model
+from results import tested
 from results.consumers import needs_emmeans, r, table
 from results.synthetic import cohort_of_36
 
@@ -267,12 +268,13 @@ def test_a_measure_that_is_the_same_in_all_is_tested_by_nothing(
     few = few.assign(session=few["phase"].map({"first": 1.0, "second": 2.0}))
     constant = pd.Series(value, few.index)
     constant[np.random.default_rng(5).choice(few.index, missing, replace=False)] = np.nan
-    table = with_factors(few.drop(columns="phase").assign(constant=constant, practice=0.0))
+    few = few.drop(columns="phase").assign(constant=constant, practice=0.0, outcome="success")
+    table = with_factors(few)
     factors, asked = factors_of(table), ["constant"]
     for made in (
-        outcomes.anova_table(table, factors, asked),
-        outcomes.contrast_table(table, factors, asked),
-        outcomes.trend_table(table, factors, asked),
+        tested.anova_table(table, factors, asked),
+        tested.contrast_table(table, factors, asked),
+        tested.trend_table(table, factors, asked),
         *outcomes.time_scale_tables(table, factors, asked),
     ):
         assert set(made["measure"]) - {"constant"}, "other measures are tested"

@@ -10,7 +10,8 @@ from scipy.stats import ttest_ind
 
 from labcrane.analysis.report.answer import _effects
 from labcrane.analysis.report.factors import with_factors
-from labcrane.analysis.report.words import STYLES, Results, paragraphs
+from labcrane.analysis.report.findings import Results
+from labcrane.analysis.report.words import STYLES, paragraphs
 from results.test_conditions import crossover
 from results.test_shortfalls import drawn, found
 

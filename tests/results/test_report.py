@@ -16,14 +16,16 @@ from labcrane.analysis.measures import measures_of, measures_of_trials
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
 from labcrane.analysis.report import figures, report
 from labcrane.analysis.report.factors import factors_of, with_factors
+from labcrane.analysis.report.findings import Results, of_gaze_measures
 from labcrane.analysis.report.html import Page
-from labcrane.analysis.report.outcomes import gaze_table, gaze_tests, little_gaze, measures_in
+from labcrane.analysis.report.outcomes import gaze_table, little_gaze, measures_in
 from labcrane.analysis.report.panels import Panel, Series, svg_of
 from labcrane.analysis.report.report import write_report
 from labcrane.analysis.report.sample import in_words, sample
-from labcrane.analysis.report.words import STYLES, Results, paragraphs
+from labcrane.analysis.report.words import STYLES, paragraphs
 from labcrane.analysis.statistics.time_outs import time_outs
 from labcrane.cli.app import main
+from results import tested
 from results.consumers import under
 from results.synthetic import cohort_of_36
 
@@ -149,16 +151,15 @@ def test_looks_are_an_outcome_that_is_tested_and_put_into_words(seed: int) -> No
     ]  # fmt: skip
     table = with_factors(pd.DataFrame(rows))
     factors = factors_of(table)
-    tests = gaze_tests(table, factors)
+    findings = list(of_gaze_measures(table, table, factors))
+    results = Results("", tested.COUNTS, factors, findings)
+    tests = results.table("gaze_tests")
     cells = table.groupby(["participant", "distance"])["dwell_during_grapple"].mean().unstack()
     t, p = ttest_rel(cells[2.0], cells[4.0])
     (row,) = tests.to_dict("records")
     assert (row["measure"], row["factor"]) == ("dwell_during_grapple", "distance")
     assert (row["df1"], row["df2"], row["epsilon"]) == (1, 7, 1.0)
     assert [row["f"], row["p_gg"]] == pytest.approx([t**2, p])
-    nothing = pd.DataFrame()
-    counts = pd.DataFrame({"trials": [32], "time_outs": [0], "others": [0]})
-    results = Results("", *[nothing] * 4, tests, nothing, counts, factors, 8, nothing)
     said = paragraphs(results, STYLES["html"])[-1]
     verb = "differed" if p < 0.05 else "did not detectably differ"
     begin = f"How long grapple was looked at during movements {verb} over distance"
@@ -175,9 +176,8 @@ def test_time_outs_are_told_by_condition_with_a_median_in_which_they_take_longer
         for distance, seconds in done.items() for number in range(5)
     ]  # fmt: skip
     counts = time_outs(pd.DataFrame(rows), ["distance"])
-    nothing = pd.DataFrame()
     factors = factors_of(with_factors(pd.DataFrame(rows).assign(sequence=1)))
-    results = Results("", *[nothing] * 6, counts, factors, 1, nothing)
+    results = Results("", counts, factors)
     (said,) = paragraphs(results, STYLES["html"])
     assert said.strip() == (
         "Of 15 trials, 6 (40.0 %) ended by time-out. Means of successes alone look fast; in the "
@@ -262,7 +262,7 @@ def test_looks_are_compared_over_groups_and_sessions(seed: int) -> None:
         for person in range(10) for session in (1, 2) for place in range(3)
     ]  # fmt: skip
     table = with_factors(pd.DataFrame(rows))
-    found = gaze_tests(table, factors_of(table)).set_index("factor")
+    found = tested.gaze_tests(table, factors_of(table)).set_index("factor")
     means = table.groupby(["participant", "group", "session"])["dwell_during_grapple"].mean()
     cells = means.unstack().reset_index("group")
     groups = [own[[1, 2]].mean(axis=1) for _, own in cells.groupby("group")]

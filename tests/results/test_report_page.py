@@ -14,19 +14,18 @@ from pages.looks import check
 from pages.room import a_browser
 
 from labcrane.analysis.cohort import find_cohort
-from labcrane.analysis.questionnaires import SCORES
 from labcrane.analysis.report import figures
 from labcrane.analysis.report.answer import answer
 from labcrane.analysis.report.factors import factors_of, with_factors
+from labcrane.analysis.report.findings import Results, of_outcomes
 from labcrane.analysis.report.html import Page
-from labcrane.analysis.report.outcomes import anova_table
 from labcrane.analysis.report.report import write_report
 from labcrane.analysis.report.style import COLUMN, MM, PAGE
-from labcrane.analysis.report.words import Results
 from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
 from labcrane.analysis.tables.definitions import MEASURES
 from results.synthetic import cohort_of_36
+from results.tested import COUNTS
 
 GROUPS = ("none", "visual", "sound")
 
@@ -135,13 +134,9 @@ def told(
 ) -> dict[str, list[str]]:
     whole = with_factors(movements)
     factors = factors_of(whole)
-    empty = pd.DataFrame()
-    anova = anova_table(whole, factors, primary)
-    scores = pd.DataFrame(columns=list(SCORES))
+    tests = list(of_outcomes(whole, whole, factors, primary))
     units = {"movement_time": "s", **{name: unit for name, (unit, _) in MEASURES.items()}}
-    results = Results(
-        "36 participants.", anova, *[empty] * 4, scores, empty, factors, 36, empty, primary, units
-    )
+    results = Results("36 participants.", COUNTS, factors, tests, primary, units)
     loops = pd.DataFrame({
         "late_ticks": [3, 0], "ticks": [1000, 1000], "lateness_worst_ms": [12.5, 1.0],
         "sync_verdict": ["WARN", "PASS"], "not_there": ["eeg, gaze", "eeg"],

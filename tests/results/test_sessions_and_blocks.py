@@ -8,9 +8,11 @@ import pytest
 
 from labcrane.analysis.report import outcomes
 from labcrane.analysis.report.factors import Factors, factors_of, with_factors
-from labcrane.analysis.report.words import STYLES, UNBALANCED, Results, paragraphs
+from labcrane.analysis.report.findings import Results, of_outcomes
+from labcrane.analysis.report.words import STYLES, UNBALANCED, paragraphs
 from labcrane.simulation.power import Claim, read_effect
 from labcrane.simulation.reported import ask, plan_test
+from results import tested
 from results.consumers import needs_emmeans, r, table
 
 BLOCKS = {1: ("guided", "free"), 2: ("guided", "free")}
@@ -89,8 +91,8 @@ def test_sessions_with_the_same_blocks_are_two_factors_as_afex_has_them(
     done, factors = told(seed, BLOCKS)
     done.to_csv(tmp_path / "movements.csv", index=False)
     theirs = table(r(AFEX, tmp_path / "movements.csv"))
-    tests = outcomes.anova_table(done, factors).set_index("factor")
-    contrasts = outcomes.contrast_table(done, factors).fillna({"at": ""})
+    tests = tested.anova_table(done, factors).set_index("factor")
+    contrasts = tested.contrast_table(done, factors).fillna({"at": ""})
     assert len(theirs) == 7 + 3 * 8 + 2
     for key, values in theirs.items():
         kind, effect = key.split(" ")
@@ -134,12 +136,10 @@ def test_sessions_with_other_blocks_are_one_factor_of_phases_and_it_is_said(
 ) -> None:
     done, factors = told(8, {1: ("guided", "free"), 2: second})
     assert (factors.crossed, factors.over_phases, factors.unbalanced) == ({}, ["phase"], True)
-    tests = outcomes.anova_table(done, factors)
+    tests = tested.anova_table(done, factors)
     assert "phase" in set(tests["factor"])
     assert not {"session", "block"} & set(tests["factor"])
-    nothing = pd.DataFrame()
-    counts = pd.DataFrame({"trials": [1], "time_outs": [0], "others": [0]})
-    results = Results("All.", tests, *[nothing] * 5, counts, factors, 14, nothing)
+    results = Results("All.", tested.COUNTS, factors, list(of_outcomes(done, done, factors)))
     assert UNBALANCED in paragraphs(results, STYLES["html"])[0]
     _, even = told(8, BLOCKS)
     assert not even.unbalanced
@@ -150,11 +150,11 @@ def test_power_is_of_the_two_factors_that_the_report_prints(text: str) -> None:
     whole = drawn(9, BLOCKS)
     done, factors = told(9, BLOCKS)
     planned = plan_test("anova", read_effect(f"movement_time~{text}"), whole, Claim())
-    rows = outcomes.anova_table(done, factors).set_index("factor")
+    rows = tested.anova_table(done, factors).set_index("factor")
     assert ask(planned, planned.results).p == pytest.approx(rows.loc[text, "p_gg"], rel=1e-9)
     if ":" in text:
         return
-    contrasts = outcomes.contrast_table(done, factors)
+    contrasts = tested.contrast_table(done, factors)
     (row,) = contrasts[(contrasts["factor"] == text) & (contrasts["at"] == "")].to_dict("records")
     effect = read_effect(f"movement_time~{text}[{row['first']},{row['second']}]")
     asked = plan_test("contrast", effect, whole, Claim())

@@ -10,9 +10,10 @@ import pytest
 from labcrane.analysis.quality import is_result
 from labcrane.analysis.questionnaires import SCORES
 from labcrane.analysis.report.factors import with_factors
+from labcrane.analysis.report.findings import Results
 from labcrane.analysis.report.html import Page
 from labcrane.analysis.report.report import _study
-from labcrane.analysis.report.words import STYLES, Results, paragraphs
+from labcrane.analysis.report.words import STYLES, paragraphs
 
 PAIRS = [(distance, side) for distance in (2.0, 3.0, 6.0) for side in ("left", "right")]
 NO_SCORES = pd.DataFrame(columns=list(SCORES))
@@ -104,14 +105,14 @@ def test_a_factor_whose_cells_nobody_but_two_has_is_named_with_why(found, seed: 
     table = given_up(table, gone)
     results, page = found(table)
     assert whole(table, ["phase", "place"]) == 2
-    assert "sequence" not in set(results.anova["factor"])
+    assert "sequence" not in set(results.table("anova")["factor"])
     said = in_words(results)
     assert (
         "2 of 9 people have a value in every cell of session and sequence, and 3 are needed" in said
     )
     assert "Not tested over sequence" in said
     assert "2 of 9 people have a value in every cell of session and sequence" in page
-    rows = results.shortfalls.set_index("factor")
+    rows = results.shortfalls().set_index("factor")
     assert rows.loc["sequence", ["people", "whole"]].tolist() == [9, 2]
     assert "session" not in rows.index
     assert "group" not in rows.index
@@ -126,9 +127,9 @@ def test_a_test_of_fewer_than_the_sample_tells_of_how_many(found, seed: int) -> 
     gone &= table["session"] == 2
     gone |= (table["participant"] == other) & (table["session"] == 2)
     results, _ = found(given_up(table, gone))
-    assert set(results.shortfalls["people"] - results.shortfalls["whole"]) <= {1, 2}
-    assert (results.shortfalls["without"] != "").all()
-    tests = results.anova.set_index("factor")
+    assert set(results.shortfalls()["people"] - results.shortfalls()["whole"]) <= {1, 2}
+    assert (results.shortfalls()["without"] != "").all()
+    tests = results.table("anova").set_index("factor")
     assert tests["n"].min() == 10
     said = in_words(results)
     for name, n in tests["n"].items():
@@ -138,16 +139,16 @@ def test_a_test_of_fewer_than_the_sample_tells_of_how_many(found, seed: int) -> 
             assert f", n = {n} of 12 people" in begin + sentence
     assert "11 of 12 people" in said
     assert "10 of 12 people" in said
-    by_hand = dict.fromkeys(results.contrasts["factor"])
+    by_hand = dict.fromkeys(results.table("contrasts")["factor"])
     for factor in by_hand:
-        own = results.contrasts[results.contrasts["factor"] == factor]
+        own = results.table("contrasts")[results.table("contrasts")["factor"] == factor]
         assert set(own["n"]) == {11}
 
 
 def test_a_test_of_the_whole_sample_says_nothing_of_n(found) -> None:
     results, page = found(drawn(3, (5, 5)))
     assert " of 10 people" not in in_words(results)
-    assert results.shortfalls.empty
+    assert results.shortfalls().empty
     assert "Every planned test was made with all participants and levels." in page
 
 
@@ -157,7 +158,7 @@ def test_a_group_that_lacks_a_session_is_named(found, seed: int) -> None:
     table = drawn(seed, (4, 5, 6))
     table = table[~((table["group"] == "b") & (table["session"] == 2))]
     results, _ = found(table)
-    rows = results.shortfalls.set_index("factor")
+    rows = results.shortfalls().set_index("factor")
     gone = "P005, P006, P007, P008 and P009"
     assert set(rows["without"]) == {"group b", gone}
     assert set(rows.loc[["session", "group"], "why"]) >= {"nothing recorded at session 2 retention"}
@@ -175,7 +176,7 @@ def test_a_group_that_lacks_a_session_is_named(found, seed: int) -> None:
 def test_a_level_that_nobody_reached_is_named_and_one_that_is_left_is_no_factor(found) -> None:
     table = drawn(5, (9,), sessions=1)
     results, _ = found(given_up(table, table["distance"] == 6.0))
-    rows = results.shortfalls
+    rows = results.shortfalls()
     own = rows[rows["factor"] == "distance"]
     assert own[["without", "why"]].to_numpy().tolist() == [
         ["distance 6", "no participant has a value there"]
@@ -190,12 +191,12 @@ def test_a_level_that_nobody_reached_is_named_and_one_that_is_left_is_no_factor(
 
 def test_where_nothing_can_be_tested_all_of_it_is_named_and_trends_too(found) -> None:
     results, page = found(drawn(6, (2,), sessions=2))
-    assert results.anova.empty
+    assert results.table("anova").empty
     said = in_words(results)
     assert said.startswith(
         "Movement time, from onset to offset, was not tested by an analysis of variance."
     )
-    rows = set(results.shortfalls["factor"])
+    rows = set(results.shortfalls()["factor"])
     assert rows == {
         "session", "sequence", "distance", "far_side", "distance:far_side",
         "linear trend of sequence in 1 acquisition", "linear trend of sequence in 2 retention",
@@ -209,3 +210,21 @@ def test_positions_that_cannot_be_told_from_pairs_are_named(found) -> None:
     table["pair"] = "pair " + table["sequence"].astype(str)
     results, _ = found(table)
     assert "positions cannot be distinguished from pairs of targets" in in_words(results)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_practice_without_groups_only_those_are_missing_who_did_not_practise(
+    found, seed: int
+) -> None:
+    table = drawn(seed, (6 + seed,), sessions=1)
+    dice = np.random.default_rng([423, seed])
+    away = set(dice.choice(sorted(table["participant"].unique()), seed, replace=False))
+    practice = table[table["sequence"] <= 2].assign(practice=1.0, block=9)
+    practice = practice[~practice["participant"].isin(away)]
+    results, _ = found(pd.concat([table, practice], ignore_index=True))
+    (test,) = results.tests("practice")
+    assert set(results.factors.people) - set(test.people) == away
+    rows = results.shortfalls()
+    own = rows[rows["factor"] == "practice"] if len(rows) else rows
+    assert set(" ".join(own.get("without", ())).replace(" and", "").split()) == away
+    assert set(own.get("why", ())) <= {"nothing recorded at practice practice"}

@@ -15,6 +15,7 @@ from labcrane.analysis.statistics.mixed import NoModelError, mixed_model
 from labcrane.analysis.statistics.reported import Reported, check_reported
 from labcrane.analysis.statistics.time_outs import median_time
 from labcrane.analysis.statistics.trends import holm, linear_trend
+from results import tested
 from results.consumers import needs_emmeans, needs_r, r, table
 from results.synthetic import cohort_of_36
 
@@ -45,12 +46,12 @@ say("fixed", fixef(mm)); say("se", sqrt(diag(as.matrix(vcov(mm))))); say("sigma"
 
 def anova_table(movements: pd.DataFrame) -> pd.DataFrame:
     table = with_factors(movements)
-    return outcomes.anova_table(table, factors_of(table))
+    return tested.anova_table(table, factors_of(table))
 
 
 def trend_table(movements: pd.DataFrame) -> pd.DataFrame:
     table = with_factors(movements)
-    return outcomes.trend_table(table, factors_of(table))
+    return tested.trend_table(table, factors_of(table))
 
 
 @pytest.fixture(scope="module")
@@ -205,7 +206,7 @@ def test_epsilon_is_1_under_sphericity_and_least_for_one_varying_level() -> None
 def test_who_lacks_a_level_is_left_out_of_the_test_by_name(movements: pd.DataFrame) -> None:
     gone = (movements["participant"] == "P004") & (movements["sequence"] == 3)
     (test,) = analyse(movements[~gone], "movement_time", ["sequence"])
-    assert (test.n, test.left_out) == (35, ("P004",))
+    assert (test.n, set(movements["participant"]) - set(test.people)) == (35, {"P004"})
     assert mixed_model(movements[~gone], "movement_time").participants == 36
 
 
@@ -270,7 +271,7 @@ def test_trends_are_corrected_over_the_outcomes_that_the_study_calls_primary(
     with_dwell: pd.DataFrame, primaries: dict[str, list[str]], name: str, primary: tuple[str, ...]
 ) -> None:
     whole = with_factors(with_dwell)
-    trends = outcomes.trend_table(whole, factors_of(whole), primary).set_index("measure")
+    trends = tested.trend_table(whole, factors_of(whole), primary).set_index("measure")
     assert set(trends.index) == set(outcomes.USUAL)  # the others are tested, uncorrected
     asked = list(primary or outcomes.USUAL)
     theirs = np.array(primaries[name], float)
@@ -297,7 +298,7 @@ def test_an_outcome_of_another_kind_is_tested_where_the_study_calls_it_primary(
     rows = with_dwell.assign(sparc=-with_dwell["movement_time"])
     whole = with_factors(rows)
     factors = factors_of(whole)
-    for make in (outcomes.anova_table, outcomes.trend_table, outcomes.contrast_table):
+    for make in (tested.anova_table, tested.trend_table, tested.contrast_table):
         own = make(whole, factors, ("sparc",)).groupby("measure")
         mirrored, plain = own.get_group("sparc"), own.get_group("movement_time")
         np.testing.assert_allclose(mirrored["p"], plain["p"], rtol=1e-9)
@@ -424,8 +425,8 @@ def test_drawn_studies_of_unequal_groups_and_missing_cells_are_those_of_afex_and
     done.to_csv(path, index=False)
     theirs = table(r(DRAWN, path))
     assert len(theirs) == 3 + 3 * 4 + 2 + 3
-    tests = outcomes.anova_table(done, factors).set_index("factor")
-    contrasts = outcomes.contrast_table(done, factors).fillna({"at": ""})
+    tests = tested.anova_table(done, factors).set_index("factor")
+    contrasts = tested.contrast_table(done, factors).fillna({"at": ""})
     contrasts = contrasts[contrasts["at"] == ""]
     words = {"phase": "session", "place": "sequence"}
     for key, values in theirs.items():

@@ -6,10 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from labcrane.analysis.report import outcomes
 from labcrane.analysis.report.factors import factors_of, with_factors
-from labcrane.analysis.report.words import STYLES, Results, paragraphs
+from labcrane.analysis.report.findings import Results, StudyFinding
+from labcrane.analysis.report.words import STYLES, paragraphs
+from labcrane.analysis.statistics.anova import Anova
+from labcrane.analysis.statistics.trends import Trend
 from labcrane.analysis.tables.definitions import MEASURES
+from results import tested
 
 UNITS = {"reaction_time": "s", **{name: unit for name, (unit, _) in MEASURES.items()}}
 SAMPLE = "Twelve people."
@@ -31,16 +34,13 @@ def in_words(measure: str, scale: float) -> str:
     whole = with_factors(pd.DataFrame(rows))
     factors = factors_of(whole)
     primary = (measure,)
-    tables = (
-        outcomes.anova_table(whole, factors, primary),
-        outcomes.contrast_table(whole, factors, primary),
-        outcomes.trend_table(whole, factors, primary),
-        outcomes.time_scale_tables(whole, factors, primary)[0],
-    )
-    none = pd.DataFrame()
-    counts = pd.DataFrame({"trials": [72], "time_outs": [0], "others": [0]})
     found = Results(
-        SAMPLE, *tables, none, none, counts, factors, 12, none, primary=primary, units=UNITS
+        SAMPLE,
+        tested.COUNTS,
+        factors,
+        tested.every_finding(whole, factors, primary),
+        primary,
+        UNITS,
     )
     return " ".join(paragraphs(found, STYLES["html"]))
 
@@ -82,52 +82,22 @@ def test_an_outcome_without_a_unit_has_no_gap_where_it_would_be(measure: str) ->
 def test_a_trend_rose_or_fell_only_where_its_corrected_p_says_so(
     slope: float, p: float, corrected: float, said: str
 ) -> None:
-    row = {
-        "measure": "movement_time",
-        "block": "1 b",
-        "slope": slope,
-        "slope_low": slope - 0.1,
-        "slope_high": slope + 0.1,
-        "t": 1.0,
-        "df": 9.0,
-        "p": p,
-        "p_holm": corrected,
-        "n": 10,
-    }
-    none = pd.DataFrame()
-    counts = pd.DataFrame({"trials": [1], "time_outs": [0], "others": [0]})
-    tests = pd.DataFrame(
-        [
-            {
-                "measure": "movement_time",
-                "factor": "x",
-                "f": 1.0,
-                "df1": 1.0,
-                "df2": 9.0,
-                "epsilon": 1.0,
-                "p_gg": 0.3,
-                "eta2p": 0.1,
-                "n": 10,
-            }
-        ]
-    )
+    trend = Trend(
+        *("movement_time", "sequence", slope, (slope - 0.1, slope + 0.1), 1.0, 9.0, p),
+        dz=0.3, n=10, people=(), phase="1 b", p_holm=corrected,
+    )  # fmt: skip
+    test = Anova(
+        "movement_time", "x", f=1.0, df1=1.0, df2=9.0, epsilon=1.0, epsilon_hf=1.0, p=0.3, p_gg=0.3,
+        eta2p=0.1, n=10, people=(),
+    )  # fmt: skip
     factors = factors_of(
         with_factors(
             pd.DataFrame({"participant": ["P001"], "sequence": [1.0], "movement_time": [1.0]})
         )
     )
-    found = Results(
-        SAMPLE,
-        tests,
-        none,
-        pd.DataFrame([row]),
-        none,
-        none,
-        none,
-        counts,
-        factors,
-        10,
-        none,
-        units={"movement_time": "s"},
-    )
+    findings = [
+        StudyFinding("anova", "movement_time", "x", test),
+        StudyFinding("trends", "movement_time", "linear trend", trend),
+    ]
+    found = Results(SAMPLE, tested.COUNTS, factors, findings, units={"movement_time": "s"})
     assert said in paragraphs(found, STYLES["html"])[1]

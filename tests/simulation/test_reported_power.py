@@ -270,7 +270,8 @@ def test_equivalence_is_shown_as_often_as_two_one_sided_tests_show_it() -> None:
 )
 def test_the_planned_test_is_the_one_that_the_report_prints(kind: str, text: str) -> None:
     """Of everybody: the p of the report's own table."""
-    from labcrane.analysis.report import outcomes
+    from results import tested
+
     from labcrane.analysis.report.factors import factors_of, with_factors
     from labcrane.analysis.statistics.mixed import mixed_model
 
@@ -281,10 +282,10 @@ def test_the_planned_test_is_the_one_that_the_report_prints(kind: str, text: str
     whole = with_factors(table)
     factors = factors_of(whole)
     if kind == "anova":
-        rows = outcomes.anova_table(whole, factors)
+        rows = tested.anova_table(whole, factors)
         expected = rows.loc[rows["factor"] == effect.factor, "p_gg"].item()
     elif kind == "contrast":
-        rows = outcomes.contrast_table(whole, factors)
+        rows = tested.contrast_table(whole, factors)
         own = rows[(rows["factor"] == effect.factor) & (rows["at"] == "")]
         pair = own[(own["first"] == effect.between[0]) & (own["second"] == effect.between[1])]
         expected = pair["p_holm"].item()

@@ -1,7 +1,7 @@
 """Answer of a study: the first page of its report, in words with their numbers."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Cohort
@@ -11,26 +11,25 @@ from labcrane.analysis.report.factors import (
     CONDITION,
     DISTANCE,
     GROUP,
-    PHASE,
     PLACE,
     SIDE,
     Factors,
     with_factors,
 )
-from labcrane.analysis.report.outcomes import ADJUSTED, SEQUENCE, named_factor, questions
-from labcrane.analysis.report.shortfalls import people_in_words
+from labcrane.analysis.report.findings import Results, StudyFinding, people_in_words
+from labcrane.analysis.report.outcomes import SEQUENCE, named_factor, questions
 from labcrane.analysis.report.words import (
     LOOKED,
     NAMES,
     STYLES,
     UNBALANCED,
-    Results,
     depends,
     f_test,
-    lacking,
-    rows_of,
+    shortfalls,
     verdict,
 )
+from labcrane.analysis.statistics.anova import Anova, Contrast
+from labcrane.analysis.statistics.trends import Trend
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,13 +112,9 @@ def _untested(results: Results | None) -> list[str]:
     """Return who of the sample is not in every test, and where the reasons are."""
     if results is None:
         return []
-    tables = (results.anova, results.contrasts, results.trends, results.gaze, results.scores)
-    names = {
-        name
-        for table in tables
-        for left_out in (table["left_out"].unique() if len(table) else ())
-        for name in str(left_out).split()
-    }
+    tests = [one.test for one in results.findings if one.table != "practice"]
+    tested = [set(test.people) for test in tests if isinstance(test, Anova | Contrast | Trend)]
+    names = {who for who in results.factors.people if any(who not in own for own in tested)}
     if not names:
         return []
     said = people_in_words(sorted(names))
@@ -131,29 +126,27 @@ def _effects(everything: "pd.DataFrame", results: Results | None) -> list[str]:
         return []
     whole = with_factors(everything)
     counted = whole[is_result(whole)]
-    found = []
-    told = [(":".join(names), columns, "") for names, columns in questions(results.factors)]
-    told += [(name, (column,), unit) for name, column, unit in _columns(results.factors)]
-    measures = [table["measure"] for table in (results.anova, results.shortfalls) if len(table)]
-    for measure in dict.fromkeys(name for names in measures for name in names):
-        if measure not in counted or str(measure).startswith(tuple(LOOKED)):
+    units = {columns: "" for _, columns in questions(results.factors)}
+    units |= {(column,): unit for _, column, unit in _columns(results.factors)}
+    paragraphs = []
+    for measure in results.measures("anova"):
+        if measure not in counted or measure.startswith(tuple(LOOKED)):
             continue  # a questionnaire's, or of gaze
-        of_it = rows_of(results.anova, str(measure))
-        others = depends(of_it)
+        own = [one for one in results.findings if one.measure == measure]
+        others = depends(test for test in results.tests("anova") if test.measure == measure)
         said = [
-            _effect(row, counted, columns, unit, results) + others.get(str(row["factor"]), "")
-            for name, columns, unit in told
-            if set(columns) <= set(counted)
-            for row in of_it
-            if _factor_of(str(row["factor"])) == name
+            _effect(one, one.test, counted, unit, results) + others.get(one.effect, "")
+            for columns, unit in units.items()
+            for one in own
+            if one.table == "anova" and one.columns == columns and isinstance(one.test, Anova)
         ]
-        short = lacking(_of_effects(results), str(measure), STYLE)
+        # People missing from tests that the answer leaves out are named in the words.
+        short = shortfalls((one for one in own if one.columns in units or one.test is None), STYLE)
         if said or short:
             effects = "; ".join(said) or "was not tested by an analysis of variance"
-            about = f"{NAMES.get(str(measure), str(measure))} {effects}."
-            standing = _standing(str(measure), results.primary)
-            found.append(" ".join([*standing, about, *short]))
-    return found or [TESTED]
+            about = f"{NAMES.get(measure, measure)} {effects}."
+            paragraphs.append(" ".join([*_standing(measure, results.primary), about, *short]))
+    return paragraphs or [TESTED]
 
 
 def _standing(measure: str, primary: Sequence[str]) -> list[str]:
@@ -163,43 +156,21 @@ def _standing(measure: str, primary: Sequence[str]) -> list[str]:
     return ["Primary outcome:" if measure in primary else "Further outcome:"]
 
 
-def _of_effects(results: Results) -> "pd.DataFrame":
-    """Return the shortfalls without people missing from tests that the answer leaves out."""
-    table = results.shortfalls
-    if not len(table):
-        return table
-    told = [name for name, _, _ in _columns(results.factors)]
-    return table[table["factor"].map(_factor_of).isin(told) | (table["without"] == "")]
-
-
-def _factor_of(effect: str) -> str:
-    """Return the factor of an effect, without its phase and adjustment."""
-    return effect.partition(" ")[0]
-
-
 def _effect(
-    row: Mapping[str, Any],
-    counted: "pd.DataFrame",
-    columns: Sequence[str],
-    unit: str,
-    results: Results,
+    finding: StudyFinding, test: Anova, counted: "pd.DataFrame", unit: str, results: Results
 ) -> str:
     """Return ``differed over distance (2 m: 3.21 s, 6 m: 5.40 s; F(1, 35) = 90.1, p < .001)``.
 
     The means are of those who are in the test, with equal weights of its design's cells.
     """
-    name, measure = str(row["factor"]), str(row["measure"])
-    if row["confounded"]:
-        return f"the effect of {name} cannot be distinguished from {row['confounded']}"
-    said, test = verdict(row, STYLE), f_test(row, STYLE, results.people)
-    if name.endswith(ADJUSTED):  # the means are those of the plain test, before it
-        return f"{said} ({test})"
-    phase = name.removeprefix(f"{SEQUENCE} in ") if name.startswith(f"{SEQUENCE} in ") else ""
-    own = counted[counted[PHASE] == phase] if phase else counted
-    own = own[~own["participant"].isin(str(row["left_out"]).split())]
-    within = [each for each in results.factors.over_phases if each not in columns]
-    if CONDITION in columns:  # each has its own phases, and a test of the means of all trials
-        own, within = own[own[CONDITION].fillna("") != ""], []
+    plan, columns, measure = finding.plan, finding.columns, test.measure
+    if test.confounded:
+        return f"the effect of {test.factor} cannot be distinguished from {test.confounded}"
+    said, tested = verdict(test, STYLE), f_test(test, STYLE, results.people)
+    if plan.beside:  # the means are those of the plain test, before it
+        return f"{said} ({tested})"
+    own = plan.of(counted[counted["participant"].isin(test.people)])
+    within = [name for name in plan.within if name not in columns]
     cells = own.groupby([*columns, "participant", *within])[measure].mean().dropna()
     by = list(range(len(columns)))
     each = cells.groupby(level=[*columns, "participant"]).mean().groupby(level=by)
@@ -211,7 +182,7 @@ def _effect(
         f"{results.quantity(f'{mean:.3g}', measure)}"
         for at, mean in means.items()
     )
-    return f"{said} ({levels}; {test})"
+    return f"{said} ({levels}; {tested})"
 
 
 def _level(at: Any, columns: Sequence[str]) -> str:

@@ -1,6 +1,6 @@
-"""Outcomes of a study in its design: tests, contrasts, time scales, questionnaires."""
+"""Outcomes of a study in its design: planned tests, contrasts, time scales, questionnaires."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,15 @@ from labcrane.analysis.report.factors import (
     SIDE,
     Factors,
 )
-from labcrane.analysis.statistics.anova import Anova, Contrast, analyse, compare
+from labcrane.analysis.statistics.anova import (
+    Anova,
+    Contrast,
+    FactorialDesign,
+    analyse,
+    compare,
+    design,
+    effects_in,
+)
 from labcrane.analysis.statistics.anova import word as word  # noqa: PLC0414 - of levels, here too
 from labcrane.analysis.statistics.confounding import told_apart
 from labcrane.analysis.statistics.time_scales import (
@@ -27,7 +35,7 @@ from labcrane.analysis.statistics.time_scales import (
     quantities,
     summary,
 )
-from labcrane.analysis.statistics.trends import Trend, holm, linear_trend
+from labcrane.analysis.statistics.trends import Trend
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,12 +50,14 @@ ADJUSTED = f" with {TAKEN}"
 """Suffix of an effect of positions that was adjusted for pairs of targets."""
 
 SEQUENCE = "sequence"
+OCCASION = "occasion"
+PRACTICE = "practice"
 
 Confusable = tuple[tuple[str, tuple[str, ...]], ...]
 """Possible confounds of an effect: each in words, with its columns."""
 
 PAIRS = "pairs of targets"
-ORDER: Confusable = (("the order in which conditions came", (PHASE,)),)
+ORDER = "the order in which conditions came"
 POSITIONS: Confusable = (("positions", (PHASE, PLACE)),)
 """Positions hold learning, and pairs their distance."""
 
@@ -59,7 +69,7 @@ BESIDE_PHASES: Confusable = (
 )
 """What may change between sessions or blocks for all participants, in addition to learning."""
 
-OF_PHASES = {PHASE, SESSION, BLOCK, CONDITION}
+OF_PHASES = {PHASE, SESSION, BLOCK, CONDITION, OCCASION}
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,11 +101,28 @@ class Plan:
         """Suffix of an effect's name: its phase and adjustment."""
         return f" in {self.phase}" * bool(self.phase) + ADJUSTED * bool(self.beside)
 
+    @property
+    def effects(self) -> list[tuple[str, ...]]:
+        """Columns of the effects it is made for; interactions come with those of one factor."""
+        return [self.asked] if self.asked else [(name,) for name in (*self.within, GROUP)]
+
     def of(self, results: "pd.DataFrame") -> "pd.DataFrame":
         """Return its movements."""
         if CONDITION in self.within:  # blocks beside them are of none
             results = results[results[CONDITION].fillna("") != ""]
         return results[results[PHASE] == self.phase] if self.phase else results
+
+    def cells(
+        self, results: "pd.DataFrame", measure: str, between: Sequence[str]
+    ) -> FactorialDesign:
+        """Return the participants' means of a measure in its cells."""
+        return design(self.of(results), measure, self.within, between, self.beside)
+
+    def tests(self, cells: FactorialDesign, measure: str) -> Iterator[Anova]:
+        """Yield the requested tests; one that was to be adjusted and was not is left out."""
+        for test in effects_in(cells, measure, self.beside):
+            if set(self.asked) <= set(test.factor.split(":")) and test.beside == self.beside:
+                yield test
 
     def confounded(
         self,
@@ -129,8 +156,12 @@ class Plan:
         return " and ".join(found)
 
 
-CONDITIONS = Plan((CONDITION,), (CONDITION,), confusable=ORDER)
+CONDITIONS = Plan((CONDITION,), (CONDITION,), confusable=((ORDER, (PHASE,)),))
 """Conditions within participants, over the means of all their blocks."""
+
+SCORE_OCCASIONS = Plan((OCCASION,), confusable=(("conditions", (CONDITION,)),))
+SCORE_CONDITIONS = Plan((CONDITION,), (CONDITION,), confusable=((ORDER, (OCCASION,)),))
+"""Scores of questionnaires, over when they were asked, and over the conditions before."""
 
 
 def measures_in(results: "pd.DataFrame", primary: Sequence[str] = ()) -> list[str]:
@@ -145,32 +176,6 @@ def rests_apart(results: "pd.DataFrame") -> bool:
         return False
     apart = results["movement_time"].notna() & (results[TO_REST] != results["movement_time"])
     return bool(apart.any())
-
-
-def anova_table(
-    results: "pd.DataFrame", factors: Factors, primary: Sequence[str] = ()
-) -> "pd.DataFrame":
-    """Return every test of every outcome over positions, distances, sides, phases and groups."""
-    found: list[Anova] = []
-    for measure in measures_in(results, primary):
-        own: dict[str, Anova] = {}
-        for plan in plans(results, factors):
-            for test in tests_of(plan, results, measure, factors):
-                name = named(test, factors)
-                if name in own:
-                    continue  # groups come with every design
-                effect = tuple(test.factor.removesuffix(plan.suffix).split(":"))
-                of_it = ""
-                if effect == (plan.asked or tuple(part for part in effect if part != GROUP)):
-                    of_it = plan.confounded(results, measure, test.people, effect)
-                own[name] = replace(test, factor=name, confounded=of_it)
-        found += own.values()
-    return _frame(found, factors.people)
-
-
-def named(test: Anova, factors: Factors) -> str:
-    """Return an effect's name as the tables have it."""
-    return named_factor(test.factor, factors)
 
 
 def named_factor(name: str, factors: Factors) -> str:
@@ -223,35 +228,10 @@ def pair_of(results: "pd.DataFrame") -> str:
 
 
 def tests(results: "pd.DataFrame", measure: str, factors: Factors) -> Iterator[Anova]:
-    """Yield the tests; the suffix of an effect's name states its phase and adjustment."""
+    """Yield the tests of an outcome, with their effects named as in the tables."""
     for plan in plans(results, factors):
-        yield from tests_of(plan, results, measure, factors)
-
-
-def tests_of(
-    plan: Plan, results: "pd.DataFrame", measure: str, factors: Factors
-) -> Iterator[Anova]:
-    """Yield the tests of one plan; one that was to be adjusted and was not is left out."""
-    for test in analyse(plan.of(results), measure, plan.within, factors.between, plan.beside):
-        if set(plan.asked) <= set(test.factor.split(":")) and test.beside == plan.beside:
-            yield replace(test, factor=test.factor + plan.suffix)
-
-
-def practice_table(
-    everything: "pd.DataFrame", factors: Factors, primary: Sequence[str] = ()
-) -> "pd.DataFrame":
-    """Return the tests of practice against counted movements; empty without practice."""
-    import pandas as pd
-
-    if not factors.practice:
-        return pd.DataFrame()
-    done = practised(everything)
-    tests = [
-        test
-        for measure in measures_in(done, primary)
-        for test in analyse(done, measure, ["practice"], factors.between)
-    ]
-    return _frame(tests, factors.people)
+        for test in plan.tests(plan.cells(results, measure, factors.between), measure):
+            yield replace(test, factor=named_factor(test.factor + plan.suffix, factors))
 
 
 def practised(everything: "pd.DataFrame") -> "pd.DataFrame":
@@ -265,12 +245,10 @@ def practice_words(movements: "pd.DataFrame") -> "pd.Series[str]":
     return movements["practice"].astype(float).map({0.0: "counted", 1.0: "practice"})
 
 
-def contrast_table(
+def contrasts(
     results: "pd.DataFrame", factors: Factors, primary: Sequence[str] = ()
-) -> "pd.DataFrame":
+) -> list[Contrast]:
     """Return differences of groups, of phases, and of groups in each phase, after Holm."""
-    import pandas as pd
-
     between, phases = factors.between, factors.over_phases
     found: list[Contrast] = []
     for measure in measures_in(results, primary):
@@ -292,47 +270,13 @@ def contrast_table(
                 two = own[own[CONDITION].isin([one.first, one.second])]
                 confounded = CONDITIONS.confounded(two, measure, one.people)
                 found.append(replace(one, confounded=confounded))
-    named = [replace(one, factor=named_factor(one.factor, factors)) for one in found]
-    return pd.DataFrame([_row(one, factors.people) for one in named])
+    return [replace(one, factor=named_factor(one.factor, factors)) for one in found]
 
 
 def _of_phases(results: "pd.DataFrame", one: Contrast, name: str) -> str:
     """Return the confounds of a difference of two sessions or blocks; empty if none."""
     two = results[results[name].isin([one.first, one.second])]
     return Plan((), (name,), confusable=BESIDE_PHASES).confounded(two, one.measure, one.people)
-
-
-def trend_table(
-    results: "pd.DataFrame", factors: Factors, primary: Sequence[str] = ()
-) -> "pd.DataFrame":
-    """Return the linear trends over positions in each phase; of primary outcomes, all share Holm.
-
-    If none is named as primary, every outcome is.
-    """
-    import pandas as pd
-
-    measures = measures_in(results, primary)
-    found = []
-    for measure in measures:
-        for phase in factors.phases:
-            own = results[results[PHASE] == phase].assign(sequence=lambda t: t[PLACE])
-            trend = linear_trend(own, measure)
-            if trend is not None:
-                found.append((phase, trend))
-    corrected = set(primary or measures)
-    p_holm = iter(holm([trend.p for _, trend in found if trend.measure in corrected]))
-    rows = [
-        {
-            **_row(trend, factors.people),
-            factors.kind: phase,
-            "confounded": trend_confounded(results, trend.measure, phase, trend.people),
-            "slope_low": trend.slope_ci[0],
-            "slope_high": trend.slope_ci[1],
-            "p_holm": next(p_holm) if trend.measure in corrected else float("nan"),
-        }
-        for phase, trend in found
-    ]
-    return pd.DataFrame(rows).drop(columns="slope_ci", errors="ignore")
 
 
 def trend_confounded(
@@ -360,7 +304,7 @@ def time_scale_tables(
         for (phase, quantity), own in found.groupby(["phase", "quantity"], sort=False):
             about = {"phase": str(phase), "quantity": str(quantity)}
             named = own.rename(columns={"value": measure})
-            made = _frame(analyse(named, measure, (), [GROUP]), factors.people)
+            made = table_of(analyse(named, measure, (), [GROUP]), factors)
             tests.append(made.assign(**about, adjustment=adjusted(own)))
     by_group = [table for table in tests if len(table)]
     joined = pd.concat(by_group, ignore_index=True) if by_group else pd.DataFrame()
@@ -409,34 +353,6 @@ def score_table(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame
         }
     )
     return table.fillna({"n_tested": 0}).astype({"n_tested": int}).reset_index()
-
-
-def score_tests(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
-    """Return the tests of every score over occasions, conditions and groups."""
-    between = [GROUP] if len({name for name in groups.values() if name}) > 1 else []
-    tests: list[Anova] = []
-    for outcome, part in occasions(scores, groups).groupby("outcome"):
-        name = str(outcome)
-        table = part.rename(columns={"value": name})
-        for test in analyse(table, name, ["occasion"], between):
-            confounded = _of_occasions(table, test, "occasion", CONDITION, "conditions")
-            tests.append(replace(test, confounded=confounded))
-        behind = after_conditions(table)
-        for test in analyse(behind, name, [CONDITION], between):
-            if CONDITION in test.factor.split(":"):
-                order, _ = ORDER[0]
-                confounded = _of_occasions(behind, test, CONDITION, "occasion", order)
-                tests.append(replace(test, confounded=confounded))
-    return _frame(tests, groups)
-
-
-def _of_occasions(table: "pd.DataFrame", test: Anova, factor: str, other: str, words: str) -> str:
-    """Return the confounds of a score's factor in those who are in its test."""
-    if test.factor != factor or other not in table or (table[other] == "").all():
-        return ""
-    known = table.dropna(subset=[test.measure])
-    known = known[known["participant"].isin(test.people)]
-    return "" if told_apart(known, [factor], [["participant"], [other]]) else words
 
 
 def with_conditions(scores: "pd.DataFrame", movements: "pd.DataFrame") -> "pd.DataFrame":
@@ -526,45 +442,23 @@ def gaze_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
     return cells.mean().join(cells.count().add_prefix("n_")).reset_index()
 
 
-def gaze_tests(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
-    """Return the tests of how long each area was looked at, over groups, phases and distances."""
-    within = [*factors.over_phases, DISTANCE]
-    tests = [
-        replace(test, factor=named(test, factors))
-        for name in of_gaze(results)
-        for test in analyse(results, name, within, factors.between)
-    ]
-    return _frame(tests, factors.people)
-
-
 def of_gaze(results: "pd.DataFrame") -> list[str]:
     """Return the columns of gaze with values."""
     names = [str(name) for name in results if str(name).startswith(("dwell_", "look_lead_"))]
     return [name for name in names if results[name].notna().any()]
 
 
-def _frame(tests: Sequence[Anova], people: Mapping[str, str]) -> "pd.DataFrame":
+def table_of(found: Iterable[Anova | Contrast | Trend], factors: Factors) -> "pd.DataFrame":
+    """Return tests as a table, each with the participants who are not in it."""
     import pandas as pd
 
-    rows = [_row(test, people) for test in tests]
+    rows = []
+    for one in found:
+        row: dict[str, Any] = asdict(one)
+        people = set(row.pop("people"))
+        row["left_out"] = " ".join(name for name in factors.people if name not in people)
+        if isinstance(one, Trend):
+            row[factors.kind] = row.pop("phase")
+            row["slope_low"], row["slope_high"] = row.pop("slope_ci")
+        rows.append(row)
     return pd.DataFrame(rows).drop(columns="beside", errors="ignore")
-
-
-def _row(result: Anova | Contrast | Trend, people: Mapping[str, str]) -> dict[str, Any]:
-    """Return a result as a row of a table, with the participants who are not in it."""
-    row: dict[str, Any] = asdict(result)
-    tested = set(row.pop("people"))
-    return row | {"left_out": " ".join(name for name in people if name not in tested)}
-
-
-def tested(results: "pd.DataFrame", measure: str, factors: Factors) -> "pd.DataFrame":
-    """Return the movements of those who are in a test over positions; empty where there is none."""
-    import pandas as pd
-
-    parts = []
-    for plan in plans(results, factors):
-        if plan.asked == (PLACE,) and not plan.beside:
-            own = plan.of(results)
-            people = next((test.people for test in tests_of(plan, results, measure, factors)), ())
-            parts.append(own[own["participant"].isin(people)])
-    return pd.concat(parts) if parts else results.iloc[:0]

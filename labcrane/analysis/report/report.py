@@ -25,19 +25,27 @@ from labcrane.analysis.report.factors import (
     CONDITION,
     GROUP,
     PLACE,
-    Factors,
     factors_of,
     running,
     with_factors,
+)
+from labcrane.analysis.report.findings import (
+    Results,
+    of_contrasts,
+    of_gaze_measures,
+    of_outcomes,
+    of_practice,
+    of_scores,
+    of_time_scales,
+    of_trends,
 )
 from labcrane.analysis.report.html import Page
 from labcrane.analysis.report.outcomes import measures_in
 from labcrane.analysis.report.protocols import in_words as protocols_in_words
 from labcrane.analysis.report.protocols import unlike_protocols
 from labcrane.analysis.report.sample import in_words, sample
-from labcrane.analysis.report.shortfalls import Made, shortfalls
 from labcrane.analysis.report.thresholds import Judge, add_thresholds, thresholds_of
-from labcrane.analysis.report.words import STYLES, UNBALANCED, Results, confounding, paragraphs
+from labcrane.analysis.report.words import STYLES, UNBALANCED, confounding, paragraphs
 from labcrane.analysis.statistics.errors import errors
 from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
@@ -253,32 +261,46 @@ def _study(
     everything = with_factors(everything)
     factors = factors_of(everything, groups)
     results = everything[is_result(everything)]
-    by = [*factors.between, *factors.by_phase, "distance"]
-    counts = time_outs(everything, by)
+    recorded = everything[everything["practice"].astype(float) == 0.0]
+    scores = outcomes.with_conditions(scores, everything)
+    scales, scales_by_group = outcomes.time_scale_tables(results, factors, primary)
+    found = Results(
+        about,
+        time_outs(everything, [*factors.between, *factors.by_phase, "distance"]),
+        factors,
+        findings=[
+            *of_outcomes(results, recorded, factors, primary),
+            *of_contrasts(results, factors, primary),
+            *of_trends(results, recorded, factors, primary),
+            *of_time_scales(scales, recorded, factors),
+            *of_practice(everything, factors, primary),
+            *of_gaze_measures(results, recorded, factors),
+            *of_scores(scores, factors),
+        ],
+        primary=tuple(primary),
+        units=units,
+    )
     page.heading("Time-outs")
     page.say(
         "Times from the trial's start. A mean of successes alone makes a hard condition look fast; "
         "in the median (Kaplan and Meier) time-outs are censored at the time limit."
     )
-    page.table("time_outs", counts)
-    _movements(page, results, factors, measures_in(results, primary))
-    anovas, contrasts, trends, scales, practice = _statistics(
-        page, everything, results, factors, primary
-    )
-    looked = _gaze(page, results, factors)
-    scores = outcomes.with_conditions(scores, everything)
-    tests = outcomes.score_tests(scores, groups)
+    page.table("time_outs", found.time_outs)
+    measures = measures_in(results, primary)
+    _movements(page, results, found, measures)
+    _statistics(page, found, measures, scales, scales_by_group)
+    for measure in measures:
+        _mixed(page, results.assign(sequence=results[PLACE]), measure)
+    _gaze(page, results, found)
     if len(scores):
         page.heading("Questionnaires")
         page.table("scores", outcomes.score_table(scores, groups))
         if len(by_condition := outcomes.condition_scores(scores, groups)):
             page.say("By condition, for participants who answered after each of them:")
             page.table("scores_by_condition", by_condition)
-        page.table("score_tests", tests)
-    made = Made(anovas, trends, scales, practice, looked, tests)
-    short = shortfalls(everything, scores, made, factors, primary)
+        page.table("score_tests", found.table("score_tests"))
     page.heading("What was not tested")
-    if len(short):
+    if len(short := found.shortfalls()):
         page.say(
             "Planned tests that were not possible, or not with all participants and levels: a test "
             "includes participants with a value in each of its cells."
@@ -286,21 +308,6 @@ def _study(
         page.table("shortfalls", short)
     else:
         page.say("Every planned test was made with all participants and levels.")
-    found = Results(
-        about,
-        anovas,
-        contrasts,
-        trends,
-        scales,
-        looked,
-        tests,
-        counts,
-        factors,
-        len(groups),
-        short,
-        tuple(primary),
-        units,
-    )
     _in_words(page, found)
     return found
 
@@ -314,15 +321,15 @@ def _in_words(page: Page, results: Results) -> None:
 
 
 def _movements(
-    page: Page, movements: "pd.DataFrame", factors: Factors, measures: Sequence[str]
+    page: Page, movements: "pd.DataFrame", found: Results, measures: Sequence[str]
 ) -> None:
     import pandas as pd
 
-    results = running(movements, factors)
+    results = running(movements, found.factors)
     page.heading("Movement time and accuracy")
     for measure in measures:
-        tested = outcomes.tested(movements, measure, factors)
-        page.draw(figures.by_sequence(results, measure, running(tested, factors)))
+        tested = running(found.in_positions(movements, measure), found.factors)
+        page.draw(figures.by_sequence(results, measure, tested))
     page.draw(figures.by_distance(results))
     if outcomes.rests_apart(results):
         page.say(_rests(results))
@@ -369,12 +376,13 @@ def _rests(results: "pd.DataFrame") -> str:
 
 def _statistics(
     page: Page,
-    everything: "pd.DataFrame",
-    results: "pd.DataFrame",
-    factors: Factors,
-    primary: Sequence[str],
-) -> "tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame, pd.DataFrame, pd.DataFrame]":
-    """Add the tests; return those of effects, contrasts, trends, time scales and practice."""
+    found: Results,
+    measures: Sequence[str],
+    scales: "pd.DataFrame",
+    scales_by_group: "pd.DataFrame",
+) -> None:
+    """Add the tests of effects, contrasts, trends, time scales and practice."""
+    factors, anovas, trends = found.factors, found.tests("anova"), found.table("trends")
     page.heading("Statistics")
     varies = [CONDITION] * bool(factors.conditions)
     varies += [outcomes.named_factor(name, factors) for name in factors.over_phases]
@@ -385,20 +393,15 @@ def _statistics(
     )
     if factors.unbalanced:
         page.say(f"{UNBALANCED}.")
-    measures = measures_in(results, primary)
-    page.say(_of_primary(primary, measures))
-    anovas = outcomes.anova_table(results, factors, primary)
-    contrasts = outcomes.contrast_table(results, factors, primary)
-    trends = outcomes.trend_table(results, factors, primary)
-    scales, scales_by_group = outcomes.time_scale_tables(results, factors, primary)
-    if anovas.empty:
+    page.say(_of_primary(found.primary, measures))
+    if not anovas:
         page.say("Tests need three or more participants with a value in every cell.")
     else:
         page.say(
             "Analysis of variance over participants' means (type III); p_gg is corrected after "
             "Greenhouse and Geisser. It shows that some levels differ, not in which direction."
         )
-        if anovas["factor"].str.contains(outcomes.ADJUSTED, regex=False).any():
+        if any(test.factor.endswith(outcomes.ADJUSTED) for test in anovas):
             page.say(
                 "Pairs of targets come in several orders: adjusted for pairs' means, a position "
                 "is compared with its pair's average, which is estimated too and costs degrees of "
@@ -406,8 +409,8 @@ def _statistics(
             )
         for note in confounding(anovas):
             page.say(note)
-        page.table("anova", anovas)
-    if len(contrasts):
+        page.table("anova", found.table("anova"))
+    if len(contrasts := found.table("contrasts")):
         page.say("Pairwise differences; p_holm is corrected within a factor, at one level.")
         page.table("contrasts", contrasts)
     if len(trends):
@@ -425,13 +428,9 @@ def _statistics(
     page.table("time_scales", scales)
     if len(scales_by_group):
         page.table("time_scales_by_group", scales_by_group)
-    practice = outcomes.practice_table(everything, factors, primary)
-    if len(practice):
+    if len(practice := found.table("practice")):
         page.say("Practice compared with counted movements.")
         page.table("practice", practice)
-    for measure in measures:
-        _mixed(page, results.assign(sequence=results[PLACE]), measure)
-    return anovas, contrasts, trends, scales, practice
 
 
 def _of_primary(primary: Sequence[str], measures: Sequence[str]) -> str:
@@ -443,10 +442,9 @@ def _of_primary(primary: Sequence[str], measures: Sequence[str]) -> str:
     return f"{said} Without a value in any movement: {', '.join(missing)}." if missing else said
 
 
-def _gaze(page: Page, results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
-    """Add dwell times; return their tests."""
-    looked = outcomes.gaze_table(results, factors)
-    tests = outcomes.gaze_tests(results, factors)
+def _gaze(page: Page, results: "pd.DataFrame", found: Results) -> None:
+    """Add dwell times, and their tests."""
+    looked, tests = outcomes.gaze_table(results, found.factors), found.table("gaze_tests")
     if len(looked):
         page.heading("Gaze")
         page.say(
@@ -464,7 +462,6 @@ def _gaze(page: Page, results: "pd.DataFrame", factors: Factors) -> "pd.DataFram
         page.table("gaze", looked)
         if len(tests):
             page.table("gaze_tests", tests)
-    return tests
 
 
 def _drifts(page: Page, looked: "pd.DataFrame") -> None:

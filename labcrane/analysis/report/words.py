@@ -1,12 +1,15 @@
 """Results in APA style, in HTML, Markdown and LaTeX."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from labcrane.analysis.report.factors import GROUP, PHASE, Factors
+from labcrane.analysis.report.factors import DISTANCE, GROUP, PHASE
+from labcrane.analysis.report.findings import Results, StudyFinding, lacking
 from labcrane.analysis.report.outcomes import questions
+from labcrane.analysis.statistics.anova import Anova, Contrast
+from labcrane.analysis.statistics.trends import Trend
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,50 +101,6 @@ STYLES: Mapping[str, Style] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Results:
-    """Results to put into words.
-
-    Attributes
-    ----------
-    sample
-        The sample in a sentence.
-    anova, contrasts, trends, scales, gaze, scores
-        The report's tables; empty ones add no text.
-    time_outs
-        Counts by condition.
-    factors
-        Factors of the study.
-    people
-        Participants of the sample; a test of others gives its own number.
-    shortfalls
-        Shortfalls of planned tests.
-    primary
-        Outcomes that the protocol names as primary.
-    units
-        Of the measures, by name; "1" and "" are none.
-    """
-
-    sample: str
-    anova: "pd.DataFrame"
-    contrasts: "pd.DataFrame"
-    trends: "pd.DataFrame"
-    scales: "pd.DataFrame"
-    gaze: "pd.DataFrame"
-    scores: "pd.DataFrame"
-    time_outs: "pd.DataFrame"
-    factors: Factors
-    people: int
-    shortfalls: "pd.DataFrame"
-    primary: tuple[str, ...] = ()
-    units: Mapping[str, str] = field(default_factory=dict)
-
-    def quantity(self, number: str, measure: str) -> str:
-        """Return a number of a measure with its unit, if it has one."""
-        unit = self.units.get(measure, "")
-        return number if unit in {"", "1"} else f"{number} {unit}"
-
-
 def paragraphs(results: Results, style: Style) -> list[str]:
     """Return the results as paragraphs in one format."""
     found = [style.plain(results.sample) + " " + _given_up(results.time_outs, style)]
@@ -149,31 +108,34 @@ def paragraphs(results: Results, style: Style) -> list[str]:
         found[0] += f" {UNBALANCED}."
     if results.factors.uneven:
         found[0] += f" {style.plain(results.factors.uneven)}"
-    tests = (results.anova, results.gaze, results.scores, results.shortfalls)
+    tables = ("anova", "gaze_tests", "score_tests")
     asked = [":".join(names) for names, _ in questions(results.factors)]
-    for measure in dict.fromkeys(name for table in tests for name in _measures(table)):
-        effects = [row for table in tests[:3] for row in rows_of(table, measure)]
-        effects.sort(key=lambda row: row["factor"] not in asked)
+    for measure in results.measures(*tables):
+        own = [one for one in results.findings if one.measure == measure]
+        effects = [test for test in results.tests(*tables) if test.measure == measure]
+        effects.sort(key=lambda test: test.factor not in asked)
         name, others = style.plain(NAMES.get(measure, _looked(measure))), depends(effects)
         sentences = [
-            _effect(row, style, results.people) + style.plain(others.get(row["factor"], ""))
-            for row in effects
+            _effect(test, style, results.people) + style.plain(others.get(test.factor, ""))
+            for test in effects
         ]
         text = "; ".join(sentences) or "was not tested by an analysis of variance"
-        more = lacking(results.shortfalls, measure, style)
-        for table, words in (
-            (results.trends, _trend), (results.scales, _scale), (results.contrasts, _contrast),
-        ):  # fmt: skip
-            more += [words(row, style, results) for row in rows_of(table, measure)]
+        more = shortfalls(own, style)
+        more += [_trend(one.test, style, results) for one in own if isinstance(one.test, Trend)]
+        more += [_scale(one.test, style, results) for one in own if isinstance(one.test, Mapping)]
+        more += [
+            _contrast(one.test, style, results) for one in own if isinstance(one.test, Contrast)
+        ]
         found.append(" ".join([f"{name} {text}.", *filter(None, more)]))
     return found
 
 
-def lacking(shortfalls: "pd.DataFrame", measure: str, style: Style) -> list[str]:
-    """Return sentences on the shortfalls of a measure's tests: each reason once."""
+def shortfalls(findings: Iterable[StudyFinding], style: Style) -> list[str]:
+    """Return sentences on what a measure's tests lack: each reason once."""
     factors: dict[tuple[str, str], list[str]] = {}
-    for row in rows_of(shortfalls, measure):
-        factors.setdefault((str(row["without"]), str(row["why"])), []).append(str(row["factor"]))
+    for one in lacking(findings):
+        for short in one.short:
+            factors.setdefault((short.without, short.why), []).append(one.effect)
     found = []
     for (without, why), names in factors.items():
         over = ", ".join(" and ".join(name.split(":")) for name in names)
@@ -182,10 +144,9 @@ def lacking(shortfalls: "pd.DataFrame", measure: str, style: Style) -> list[str]
     return found
 
 
-def of_people(row: Mapping[str, Any], style: Style, people: int) -> str:
+def of_people(n: int, style: Style, people: int) -> str:
     """Return ``, n = 33 of 36 people`` where a test is not of the whole sample."""
-    number = int(row["n"])
-    return "" if number == people else f", {style.symbol('n')} = {number} of {people} people"
+    return "" if n == people else f", {style.symbol('n')} = {n} of {people} people"
 
 
 def _looked(outcome: str) -> str:
@@ -194,18 +155,6 @@ def _looked(outcome: str) -> str:
         if outcome.startswith(start):
             return words.format(outcome.removeprefix(start))
     return outcome
-
-
-def rows_of(table: "pd.DataFrame", measure: str) -> list[dict[str, Any]]:
-    """Return a measure's rows of a table."""
-    if not len(table):
-        return []
-    rows = table[table["measure"] == measure].to_dict("records")
-    return [{str(name): value for name, value in row.items()} for row in rows]
-
-
-def _measures(table: "pd.DataFrame") -> list[str]:
-    return list(map(str, table["measure"].unique())) if len(table) else []
 
 
 def _given_up(table: "pd.DataFrame", style: Style) -> str:
@@ -237,36 +186,36 @@ def _slow(row: Mapping[str, Any], style: Style) -> str:
     return f"{', '.join(where)}: {row['time_outs']} of {row['trials']}, {successes}, {median}"
 
 
-def f_test(row: Mapping[str, Any], style: Style, people: int) -> str:
+def f_test(test: Anova, style: Style, people: int) -> str:
     """Return ``F(5.27, 184.33) = 2.43, p = .034, ηp² = .06``, corrected where it matters.
 
     The number of participants follows if not all of the sample are in it.
     """
-    whole = row["epsilon"] == 1.0
-    df = [row["epsilon"] * row["df1"], row["epsilon"] * row["df2"]]
+    whole = test.epsilon == 1.0
+    df = [test.epsilon * test.df1, test.epsilon * test.df2]
     free = ", ".join(f"{value:.0f}" if whole else f"{value:.2f}" for value in df)
     return (
-        f"{style.symbol('F')}({free}) = {row['f']:.2f}, {_p(row['p_gg'], style)}, "
-        f"{style.eta} = {_share(row['eta2p'], 2)}{of_people(row, style, people)}"
+        f"{style.symbol('F')}({free}) = {test.f:.2f}, {_p(test.p_gg, style)}, "
+        f"{style.eta} = {_share(test.eta2p, 2)}{of_people(test.n, style, people)}"
     )
 
 
-def verdict(row: Mapping[str, Any], style: Style) -> str:
+def verdict(test: Anova, style: Style) -> str:
     """Return ``differed over distance``, or ``showed an interaction of group and block``."""
-    effect, _, rest = str(row["factor"]).partition(" ")
+    effect, _, rest = test.factor.partition(" ")
     names = style.plain(" and ".join(effect.split(":")) + (f" {rest}" if rest else ""))
     if ":" in effect:
-        said = "showed an" if row["p_gg"] < LEVEL else "showed no detectable"
+        said = "showed an" if test.p_gg < LEVEL else "showed no detectable"
         return f"{said} interaction of {names}"
-    return f"{'differed' if row['p_gg'] < LEVEL else 'did not detectably differ'} over {names}"
+    return f"{'differed' if test.p_gg < LEVEL else 'did not detectably differ'} over {names}"
 
 
-def depends(tests: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+def depends(tests: Iterable[Anova]) -> dict[str, str]:
     """Return what to add to each main effect whose factor is in an interaction that was found."""
     others: dict[str, list[str]] = {}
-    for row in tests:
-        parts = str(row["factor"]).partition(" ")[0].split(":")
-        if len(parts) > 1 and row["p_gg"] < LEVEL and not row.get("confounded"):
+    for test in tests:
+        parts = test.factor.partition(" ")[0].split(":")
+        if len(parts) > 1 and test.p_gg < LEVEL and not test.confounded:
             for part in parts:
                 others.setdefault(part, []).extend(other for other in parts if other != part)
     return {
@@ -275,8 +224,8 @@ def depends(tests: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     }
 
 
-def _effect(row: Mapping[str, Any], style: Style, people: int) -> str:
-    return f"{verdict(row, style)}{_confounded(row)}, {f_test(row, style, people)}"
+def _effect(test: Anova, style: Style, people: int) -> str:
+    return f"{verdict(test, style)}{_confounded(test.confounded)}, {f_test(test, style, people)}"
 
 
 def changed(estimate: float, p: float) -> str:
@@ -286,19 +235,19 @@ def changed(estimate: float, p: float) -> str:
     return "fell by" if estimate < 0 else "rose by"
 
 
-def _trend(row: Mapping[str, Any], style: Style, results: Results) -> str:
-    phase = next((str(row[kind]) for kind in ("session", "block", "phase") if kind in row), "")
-    corrected = not math.isnan(row["p_holm"])
-    holm = f" (after Holm {_p(row['p_holm'], style)})" if corrected else ""
-    said = changed(row["slope"], row["p_holm"] if corrected else row["p"])
-    low, high = _number(row["slope_low"], style), _number(row["slope_high"], style)
-    widest = max(abs(row["slope_low"]), abs(row["slope_high"]))
-    slope = 0.0 if abs(row["slope"]) < ROUNDING * widest else row["slope"]
+def _trend(trend: Trend, style: Style, results: Results) -> str:
+    corrected = not math.isnan(trend.p_holm)
+    holm = f" (after Holm {_p(trend.p_holm, style)})" if corrected else ""
+    said = changed(trend.slope, trend.p_holm if corrected else trend.p)
+    low, high = (_number(end, style) for end in trend.slope_ci)
+    widest = max(map(abs, trend.slope_ci))
+    slope = 0.0 if abs(trend.slope) < ROUNDING * widest else trend.slope
     number = _number(slope, style) if said.endswith(":") else f"{abs(slope):.3g}"
+    tested = f"{_t(trend.t, trend.df, trend.p, style)}{holm}"
     return (
-        f"Over the positions of {style.plain(phase)}{_confounded(row)} it {said} "
-        f"{results.quantity(number, row['measure'])} each, 95 {style.percent} CI [{low}, {high}], "
-        f"{_t(row, style)}{holm}{of_people(row, style, results.people)}."
+        f"Over the positions of {style.plain(trend.phase)}{_confounded(trend.confounded)} it "
+        f"{said} {results.quantity(number, trend.measure)} each, 95 {style.percent} CI "
+        f"[{low}, {high}], {tested}{of_people(trend.n, style, results.people)}."
     )
 
 
@@ -310,53 +259,58 @@ def _scale(row: Mapping[str, Any], style: Style, results: Results) -> str:
         "difference score": "Difference score from the last position to the first of",
         "net gain": "Net gain from last position to last position, to",
     }
-    if row["group"] != "all" or row["quantity"] not in spoken:
+    if row["quantity"] not in spoken:
         return ""
     mean = results.quantity(_number(row["mean"], style), row["measure"])
     said = f"{spoken[row['quantity']]} {style.plain(str(row['phase']))}"
     if row["why"]:
         return f"{said}: not tested, {row['why']}."
-    said += _confounded(row)
+    said += _confounded(row["confounded"])
     said += f", with {row['adjustment']}:" if row["adjustment"] else ":"
-    return f"{said} {mean}, {_t(row, style)}{of_people(row, style, results.people)}."
+    tested = (
+        f"{_t(row['t'], row['df'], row['p'], style)}{of_people(row['n'], style, results.people)}"
+    )
+    return f"{said} {mean}, {tested}."
 
 
-def _contrast(row: Mapping[str, Any], style: Style, results: Results) -> str:
-    if math.isnan(row["t"]):
+def _contrast(one: Contrast, style: Style, results: Results) -> str:
+    if math.isnan(one.t):
         return ""  # all are alike
-    at = f" in {style.plain(str(row['at']))}" if row["at"] else ""
-    at += _confounded(row)
-    first, second = style.plain(str(row["first"])), style.plain(str(row["second"]))
-    difference = results.quantity(_number(row["difference"], style), row["measure"])
-    if row["factor"] == "distance":
+    at = f" in {style.plain(one.at)}" if one.at else ""
+    at += _confounded(one.confounded)
+    first, second = style.plain(one.first), style.plain(one.second)
+    difference = results.quantity(_number(one.difference, style), one.measure)
+    if one.factor == DISTANCE:
         first, second = f"{first} m", f"{second} m"
-    low, high = _number(row["ci_low"], style), _number(row["ci_high"], style)
+    low, high = _number(one.ci_low, style), _number(one.ci_high, style)
     return (
         f"{first} minus {second}{at}: {difference}, "
-        f"95 {style.percent} CI [{low}, {high}], {style.symbol('t')}({row['df']:.0f}) = "
-        f"{_number(row['t'], style, '.2f')}, Holm-corrected {_p(row['p_holm'], style)}"
-        f"{of_people(row, style, results.people)}."
+        f"95 {style.percent} CI [{low}, {high}], {style.symbol('t')}({one.df:.0f}) = "
+        f"{_number(one.t, style, '.2f')}, Holm-corrected {_p(one.p_holm, style)}"
+        f"{of_people(one.n, style, results.people)}."
     )
 
 
-def _confounded(row: Mapping[str, Any]) -> str:
+def _confounded(words: str) -> str:
     """Return `` (cannot be distinguished from positions)`` where an effect is confounded."""
-    return f" (cannot be distinguished from {row['confounded']})" if row.get("confounded") else ""
+    return f" (cannot be distinguished from {words})" if words else ""
 
 
-def confounding(anova: "pd.DataFrame") -> list[str]:
+def confounding(tests: Iterable[Anova]) -> list[str]:
     """Return a sentence for each confound that factors cannot be distinguished from."""
-    rows = anova[anova["confounded"] != ""].drop_duplicates(["factor", "confounded"])
+    factors: dict[str, dict[str, None]] = {}
+    for test in tests:
+        if test.confounded:
+            factors.setdefault(test.confounded, {})[test.factor] = None
     return [
-        f"The effect{'s' * (len(own) > 1)} of {' and '.join(own['factor'])} cannot be "
+        f"The effect{'s' * (len(own) > 1)} of {' and '.join(own)} cannot be "
         f"distinguished from {words}: in these orders, either may have caused the difference."
-        for words, own in rows.groupby("confounded")
+        for words, own in sorted(factors.items())
     ]
 
 
-def _t(row: Mapping[str, Any], style: Style) -> str:
-    value = _number(row["t"], style, ".2f")
-    return f"{style.symbol('t')}({row['df']:.0f}) = {value}, {_p(row['p'], style)}"
+def _t(t: float, df: float, p: float, style: Style) -> str:
+    return f"{style.symbol('t')}({df:.0f}) = {_number(t, style, '.2f')}, {_p(p, style)}"
 
 
 def _number(value: float, style: Style, spec: str = ".3g") -> str:

@@ -46,10 +46,8 @@ class Anova:
         Partial eta squared, F·df1 / (F·df1 + df2).
     n
         Participants.
-    left_out
-        Participants without a value in some cell, and therefore not in the test.
     people
-        Participants in the test.
+        Participants in the test: they have a value in every cell, and are not alone in a group.
     beside
         The column that the effect was adjusted for; empty without adjustment.
     confounded
@@ -67,7 +65,6 @@ class Anova:
     p_gg: float
     eta2p: float
     n: int
-    left_out: tuple[str, ...]
     people: tuple[str, ...]
     beside: str = ""
     confounded: str = ""
@@ -133,10 +130,12 @@ class FactorialDesign:
         Columns of the model by term; ``()`` is the intercept.
     beside
         Shares of what is adjusted for in each cell, sum-to-zero: participants, cells, columns.
-    left_out
-        Participants without a value in some cell.
     people
-        Those who have all of them, in the order of the rows.
+        Participants of the rows, in their order: they have a value in every cell.
+    alone
+        Those who have, too, and are left out, since they are alone in a group or in none.
+    empty
+        Cells in which no participant has a value.
     """
 
     values: FloatArray
@@ -145,8 +144,16 @@ class FactorialDesign:
     model: FloatArray
     terms: dict[tuple[str, ...], list[int]]
     beside: FloatArray
-    left_out: tuple[str, ...]
     people: tuple[str, ...]
+    alone: tuple[str, ...]
+    empty: tuple[tuple[Any, ...], ...]
+
+    @property
+    def testable(self) -> bool:
+        """Whether there are participants enough for their variance and for all groups."""
+        if len(self.people) < LEAST or self.free < 1:
+            return False
+        return bool(np.linalg.matrix_rank(self.model) == self.model.shape[1])
 
     @property
     def free(self) -> int:
@@ -160,32 +167,31 @@ def design(
     within: Sequence[str],
     between: Sequence[str],
     beside: str = "",
-) -> FactorialDesign | None:
-    """Return the cells of a design; None where fewer than three whole participants are left.
+) -> FactorialDesign:
+    """Return the cells of a design, perhaps with too few participants for a test.
 
-    A participant's value in a cell is the mean over their rows there. A factor of one level is
-    ignored. Who is alone in a group is left out.
+    A participant's value in a cell is the mean over their rows there. Levels without a value, and
+    factors of one level, have no cells. Who is alone in a group is left out.
     """
     known = table.dropna(subset=[measure])
     levels = _levels(known, within)
     wide = _cells(known, known[measure], levels)
     whole = wide.dropna()
     who = known.groupby("participant")[list(between)].first().loc[whole.index]
+    single: set[Any] = set()
     if between:
-        own = dict(zip(who.index, who.itertuples(index=False), strict=True))
-        whole, who = (each.drop(index=list(alone(own))) for each in (whole, who))
-    left_out = tuple(map(str, wide.index.difference(whole.index)))
+        single = alone(dict(zip(who.index, who.itertuples(index=False), strict=True)))
+        whole, who = (each.drop(index=list(single)) for each in (whole, who))
     groups = {name: tuple(sorted(who[name].unique())) for name in between}
     groups = {name: own for name, own in groups.items() if len(own) > 1}
     model, terms = _model(who, groups)
     shares = _shares(known, beside, levels, whole.index)
-    people = tuple(map(str, whole.index))
-    found = FactorialDesign(
-        whole.to_numpy(float), levels, groups, model, terms, shares, left_out, people
+    people, single_people = (tuple(map(str, each)) for each in (whole.index, sorted(single)))
+    empty: list[Any] = [cell for cell in wide.columns if len(wide) and wide[cell].isna().all()]
+    cells = tuple(cell if isinstance(cell, tuple) else (cell,) for cell in empty)
+    return FactorialDesign(
+        whole.to_numpy(float), levels, groups, model, terms, shares, people, single_people, cells
     )
-    rank = int(np.linalg.matrix_rank(model)) if len(whole) else 0
-    whole_enough = len(whole) >= LEAST and found.free >= 1 and rank == model.shape[1]
-    return found if whole_enough else None
 
 
 def alone(groups: Mapping[Any, Any]) -> set[Any]:
@@ -198,20 +204,6 @@ def alone(groups: Mapping[Any, Any]) -> set[Any]:
     """
     counts = Counter(groups.values())
     return {who for who, own in groups.items() if counts[own] == 1 or "" in (own, *own)}
-
-
-def whole_people(
-    table: "pd.DataFrame", measure: str, within: Sequence[str]
-) -> tuple[list[str], list[tuple[Any, ...]]]:
-    """Return who has a value in every cell of a design, and the cells without any value.
-
-    Levels without any value, and factors of one level, have no cells.
-    """
-    known = table.dropna(subset=[measure])
-    wide = _cells(known, known[measure], _levels(known, within))
-    empty: list[Any] = [cell for cell in wide.columns if len(wide) and wide[cell].isna().all()]
-    cells = [cell if isinstance(cell, tuple) else (cell,) for cell in empty]
-    return [str(name) for name in wide.dropna().index], cells
 
 
 def _levels(known: "pd.DataFrame", within: Sequence[str]) -> dict[str, tuple[Any, ...]]:
@@ -298,8 +290,12 @@ def analyse(
         A column whose levels every effect is adjusted for: an analysis of covariance in each
         stratum. Effects that cannot be distinguished from it are not tested.
     """
-    cells = design(table, measure, within, between, beside)
-    if cells is None:
+    return effects_in(design(table, measure, within, between, beside), measure, beside)
+
+
+def effects_in(cells: FactorialDesign, measure: str, beside: str = "") -> list[Anova]:
+    """Test every effect of a design that can be tested, as :func:`analyse` does."""
+    if not cells.testable:
         return []
     found = []
     for inside in _subsets(list(cells.within)):
@@ -380,7 +376,6 @@ def _test(
         p_gg=float(distribution.sf(f, epsilon * df1, epsilon * df2)),
         eta2p=f * df1 / (f * df1 + df2),
         n=len(cells.values),
-        left_out=cells.left_out,
         people=cells.people,
     )
 
@@ -410,7 +405,7 @@ def compare(
         A factor within participants; the comparison is made separately at each of its levels.
     """
     cells = design(table, measure, within, between)
-    if cells is None or factor not in {**cells.within, **cells.between}:
+    if not cells.testable or factor not in {**cells.within, **cells.between}:
         return []
     places = cells.within.get(at, (None,))
     found = []

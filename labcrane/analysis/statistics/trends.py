@@ -32,6 +32,12 @@ class Trend:
         Participants.
     people
         Who they are.
+    phase
+        The session or block, where it is of one.
+    confounded
+        What it cannot be distinguished from, in words; empty if nothing, or not tested.
+    p_holm
+        The same corrected for all trends of primary outcomes; NaN of others.
     """
 
     measure: str
@@ -44,6 +50,9 @@ class Trend:
     dz: float
     n: int
     people: tuple[str, ...]
+    phase: str = ""
+    confounded: str = ""
+    p_holm: float = float("nan")
 
 
 def linear_trend(movements: "pd.DataFrame", measure: str) -> Trend | None:
