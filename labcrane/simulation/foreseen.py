@@ -10,6 +10,7 @@ from labcrane.analysis.measures import ordered
 from labcrane.analysis.report import outcomes
 from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.report.findings import of_outcomes
+from labcrane.analysis.report.outcomes import StudyMovements
 from labcrane.analysis.statistics.anova import Anova
 from labcrane.design.plan import plan_session
 from labcrane.protocol.study import Study
@@ -40,7 +41,7 @@ def foreseen_tests(study: Study) -> pd.DataFrame:
     people = dict(zip(table["participant"], dice.normal(size=len(table)), strict=True))
     table["movement_time"] = table["participant"].map(people) + dice.normal(size=len(table))
     whole = with_factors(table)
-    found = of_outcomes(whole, whole, factors_of(whole), ["movement_time"])
+    found = of_outcomes(StudyMovements(whole, whole, factors_of(whole), ["movement_time"]))
     tests = [one.test for one in found if one.measure == "movement_time"]
     rows = [(one.factor, one.n, one.confounded) for one in tests if isinstance(one, Anova)]
     return pd.DataFrame(rows, columns=["factor", "n", "confounded"])

@@ -123,7 +123,7 @@ def test_what_comes_with_each_block_in_everybody_is_named_beside_its_change() ->
     assert of_blocks.loc["block", "confounded"] == "conditions"
     contrasts = tested.contrast_table(alike, factors).set_index("factor")
     assert contrasts.loc["block", "confounded"] == "conditions"
-    scales, _ = outcomes.time_scale_tables(alike, factors)
+    scales = tested.time_scales(alike, factors)
     change = scales[(scales["quantity"] == "change") & (scales["measure"] == "movement_time")]
     assert set(change["confounded"]) == {"conditions"}
     slope = scales[scales["quantity"] == "slope"]

@@ -12,7 +12,6 @@ from labcrane.analysis.report.findings import Results
 from labcrane.analysis.report.words import STYLES, paragraphs
 from labcrane.analysis.statistics.confounding import told_apart
 from results.test_shortfalls import drawn, found, in_words
-from results.tested import scales_in
 
 __all__ = ["found"]
 
@@ -123,7 +122,7 @@ def test_two_orders_that_mirror_each_other_tell_a_trend_and_not_each_position(
     table["sequence"] = table["sequence"].mask(other, 7 - table["sequence"])
     assert not told_apart(table, ["sequence"], [["participant"], ["pair"]])
     results, _ = found(table)
-    scales = scales_in(results).set_index("quantity")
+    scales = results.table("time_scales").set_index("quantity")
     assert scales.loc["slope", "adjustment"] == TAKEN.removeprefix("with ")
     assert np.isfinite(scales.loc["slope", "t"])
 

@@ -14,9 +14,10 @@ from labcrane.analysis.report import figures, outcomes
 from labcrane.analysis.report.answer import _effects, _untested
 from labcrane.analysis.report.factors import factors_of, running, with_factors
 from labcrane.analysis.report.findings import Results, of_outcomes
+from labcrane.analysis.report.outcomes import StudyMovements
 from results.consumers import needs_r, r, table
 from results.test_shortfalls import drawn, found, given_up, in_words
-from results.tested import COUNTS, scales_in, score_tests
+from results.tested import COUNTS, score_tests
 
 __all__ = ["found"]
 
@@ -131,12 +132,13 @@ def test_who_is_missing_is_named_with_why_and_in_every_table(
         results.table("anova"),
         results.table("contrasts"),
         results.table("trends"),
-        scales_in(results),
+        results.table("time_scales"),
     )
     people = movements["participant"].nunique()
     for each in tables:
         counted = each["left_out"].str.split().str.len()
-        assert (each["n"] + counted == people).all()
+        own = each[each["group"] == "all"] if "quantity" in each else each
+        assert (own["n"] + counted[own.index] == people).all()
     assert set(results.table("contrasts")["left_out"]) == {" ".join(gone)}
 
 
@@ -168,7 +170,7 @@ def test_trends_contrasts_and_time_scales_are_of_the_rows_that_they_say(
     wanted = wide.groupby("group")["difference"].mean().mean()  # groups alike, as afex has them
     assert row["difference"] == pytest.approx(wanted, rel=1e-9)
     assert row["n"] == len(stays)
-    scales = scales_in(results)[scales_in(results)["group"] == "all"].set_index(
+    scales = results.table("time_scales")[results.table("time_scales")["group"] == "all"].set_index(
         ["phase", "quantity"]
     )
     assert scales.loc[("1 acquisition", "slope"), "n"] == people
@@ -182,7 +184,7 @@ def test_the_means_of_a_figure_are_of_those_tested_and_its_lines_of_everybody(
     whole = with_factors(movements)
     factors = factors_of(whole)
     results = whole[is_result(whole)]
-    findings = list(of_outcomes(results, results, factors))
+    findings = list(of_outcomes(StudyMovements(results, results, factors)))
     tested = Results("", COUNTS, factors, findings).in_positions(results, "movement_time")
     assert sorted(tested["participant"].unique()) == stays
     shown = running(results, factors)

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from labcrane.analysis.report import outcomes
 from labcrane.analysis.report.factors import factors_of, with_factors
+from labcrane.analysis.report.findings import Results
 from labcrane.analysis.statistics.anova import analyse
 from labcrane.analysis.statistics.mixed import NoModelError, mixed_model
 from results import tested
@@ -271,12 +271,9 @@ def test_a_measure_that_is_the_same_in_all_is_tested_by_nothing(
     few = few.drop(columns="phase").assign(constant=constant, practice=0.0, outcome="success")
     table = with_factors(few)
     factors, asked = factors_of(table), ["constant"]
-    for made in (
-        tested.anova_table(table, factors, asked),
-        tested.contrast_table(table, factors, asked),
-        tested.trend_table(table, factors, asked),
-        *outcomes.time_scale_tables(table, factors, asked),
-    ):
+    found = Results("", tested.COUNTS, factors, tested.every_finding(table, factors, asked))
+    tables = ("anova", "contrasts", "trends", "time_scales", "time_scales_by_group")
+    for made in map(found.table, tables):
         assert set(made["measure"]) - {"constant"}, "other measures are tested"
         own = made[made["measure"] == "constant"]
         assert own["p"].isna().all()

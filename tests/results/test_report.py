@@ -18,7 +18,7 @@ from labcrane.analysis.report import figures, report
 from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.report.findings import Results, of_gaze_measures
 from labcrane.analysis.report.html import Page
-from labcrane.analysis.report.outcomes import gaze_table, little_gaze, measures_in
+from labcrane.analysis.report.outcomes import StudyMovements, gaze_table, little_gaze, measures_in
 from labcrane.analysis.report.panels import Panel, Series, svg_of
 from labcrane.analysis.report.report import write_report
 from labcrane.analysis.report.sample import in_words, sample
@@ -151,7 +151,7 @@ def test_looks_are_an_outcome_that_is_tested_and_put_into_words(seed: int) -> No
     ]  # fmt: skip
     table = with_factors(pd.DataFrame(rows))
     factors = factors_of(table)
-    findings = list(of_gaze_measures(table, table, factors))
+    findings = list(of_gaze_measures(StudyMovements(table, table, factors)))
     results = Results("", tested.COUNTS, factors, findings)
     tests = results.table("gaze_tests")
     cells = table.groupby(["participant", "distance"])["dwell_during_grapple"].mean().unstack()

@@ -19,6 +19,7 @@ from labcrane.analysis.report.answer import answer
 from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.report.findings import Results, of_outcomes
 from labcrane.analysis.report.html import Page
+from labcrane.analysis.report.outcomes import StudyMovements
 from labcrane.analysis.report.report import write_report
 from labcrane.analysis.report.style import COLUMN, MM, PAGE
 from labcrane.analysis.statistics.fitts import throughput
@@ -134,7 +135,7 @@ def told(
 ) -> dict[str, list[str]]:
     whole = with_factors(movements)
     factors = factors_of(whole)
-    tests = list(of_outcomes(whole, whole, factors, primary))
+    tests = list(of_outcomes(StudyMovements(whole, whole, factors, primary)))
     units = {"movement_time": "s", **{name: unit for name, (unit, _) in MEASURES.items()}}
     results = Results("36 participants.", COUNTS, factors, tests, primary, units)
     loops = pd.DataFrame({

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from labcrane.analysis.report import outcomes
 from labcrane.analysis.report.factors import Factors, factors_of, with_factors
 from labcrane.analysis.report.findings import Results, of_outcomes
+from labcrane.analysis.report.outcomes import StudyMovements
 from labcrane.analysis.report.words import STYLES, UNBALANCED, paragraphs
 from labcrane.simulation.power import Claim, read_effect
 from labcrane.simulation.reported import ask, plan_test
@@ -116,13 +116,13 @@ def test_learning_goes_from_the_last_block_of_a_session_to_the_first_of_the_next
     assert factors.phases == (
         "1 acquisition, guided", "2 acquisition, free", "3 retention, guided", "4 retention, free",
     )  # fmt: skip
-    scales, _ = outcomes.time_scale_tables(done, factors)
+    scales = tested.time_scales(done, factors)
     own = scales[scales["group"] == "all"]
     found = own.groupby("quantity")["phase"].agg(list)
     assert found["change"] == list(factors.phases[1:])
     assert found["difference score"] == found["net gain"] == ["3 retention, guided"]
     before = done.assign(pair="one")  # nothing is taken away
-    scales, _ = outcomes.time_scale_tables(before, factors)
+    scales = tested.time_scales(before, factors)
     row = scales[(scales["quantity"] == "difference score") & (scales["group"] == "all")]
     cells = done.groupby(["participant", "phase", "place"])["movement_time"].mean().unstack([1, 2])
     last = cells["2 acquisition, free"][float(PLACES)]
@@ -139,7 +139,9 @@ def test_sessions_with_other_blocks_are_one_factor_of_phases_and_it_is_said(
     tests = tested.anova_table(done, factors)
     assert "phase" in set(tests["factor"])
     assert not {"session", "block"} & set(tests["factor"])
-    results = Results("All.", tested.COUNTS, factors, list(of_outcomes(done, done, factors)))
+    results = Results(
+        "All.", tested.COUNTS, factors, list(of_outcomes(StudyMovements(done, done, factors)))
+    )
     assert UNBALANCED in paragraphs(results, STYLES["html"])[0]
     _, even = told(8, BLOCKS)
     assert not even.unbalanced

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 
 import pandas as pd
 
-from labcrane.analysis.report import outcomes
 from labcrane.analysis.report.factors import Factors
 from labcrane.analysis.report.findings import (
     Results,
@@ -16,6 +15,7 @@ from labcrane.analysis.report.findings import (
     of_time_scales,
     of_trends,
 )
+from labcrane.analysis.report.outcomes import StudyMovements
 
 COUNTS = pd.DataFrame({"trials": [1], "time_outs": [0], "others": [0]})
 
@@ -24,30 +24,34 @@ def _table(name: str, findings: Iterable[StudyFinding], factors: Factors) -> pd.
     return Results("", COUNTS, factors, list(findings)).table(name)
 
 
+def all_results(
+    movements: pd.DataFrame, factors: Factors, primary: Sequence[str] = ()
+) -> StudyMovements:
+    """Return movements that are all results."""
+    whole = movements.assign(outcome="success")
+    return StudyMovements(whole, whole, factors, primary)
+
+
 def anova_table(
     results: pd.DataFrame, factors: Factors, primary: Sequence[str] = ()
 ) -> pd.DataFrame:
-    return _table(
-        "anova", of_outcomes(*[results.assign(outcome="success")] * 2, factors, primary), factors
-    )
+    return _table("anova", of_outcomes(all_results(results, factors, primary)), factors)
 
 
 def trend_table(
     results: pd.DataFrame, factors: Factors, primary: Sequence[str] = ()
 ) -> pd.DataFrame:
-    return _table(
-        "trends", of_trends(*[results.assign(outcome="success")] * 2, factors, primary), factors
-    )
+    return _table("trends", of_trends(all_results(results, factors, primary)), factors)
 
 
 def contrast_table(
     results: pd.DataFrame, factors: Factors, primary: Sequence[str] = ()
 ) -> pd.DataFrame:
-    return _table("contrasts", of_contrasts(results, factors, primary), factors)
+    return _table("contrasts", of_contrasts(all_results(results, factors, primary)), factors)
 
 
 def gaze_tests(results: pd.DataFrame, factors: Factors) -> pd.DataFrame:
-    return _table("gaze_tests", of_gaze_measures(results, results, factors), factors)
+    return _table("gaze_tests", of_gaze_measures(all_results(results, factors)), factors)
 
 
 def score_tests(scores: pd.DataFrame, people: dict[str, str]) -> pd.DataFrame:
@@ -55,19 +59,18 @@ def score_tests(scores: pd.DataFrame, people: dict[str, str]) -> pd.DataFrame:
     return _table("score_tests", of_scores(scores, factors), factors)
 
 
-def scales_in(results: Results) -> pd.DataFrame:
-    """Return the quantities of the time scales over all groups."""
-    return pd.DataFrame(one.test for one in results.findings if one.table == "time_scales")
+def time_scales(results: pd.DataFrame, factors: Factors) -> pd.DataFrame:
+    return _table("time_scales", of_time_scales(all_results(results, factors)), factors)
 
 
 def every_finding(
     results: pd.DataFrame, factors: Factors, primary: Sequence[str] = ()
 ) -> list[StudyFinding]:
     """Return the findings from movements that are all results."""
-    of_scales, _ = outcomes.time_scale_tables(results, factors, primary)
+    study = all_results(results, factors, primary)
     return [
-        *of_outcomes(results, results, factors, primary),
-        *of_contrasts(results, factors, primary),
-        *of_trends(results, results, factors, primary),
-        *of_time_scales(of_scales, results, factors),
+        *of_outcomes(study),
+        *of_contrasts(study),
+        *of_trends(study),
+        *of_time_scales(study),
     ]

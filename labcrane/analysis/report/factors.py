@@ -75,13 +75,6 @@ class Factors:
         """Whether sessions have different blocks, so that phases are one factor of two."""
         return self.kind == "phase" and not self.crossed
 
-    def levels(self, column: str) -> tuple[Any, ...]:
-        """Return the planned levels of a column; a phase of few places has fewer."""
-        if column == PLACE:
-            return tuple(map(float, range(1, max(self.places.values(), default=0) + 1)))
-        own = {GROUP: self.groups, PHASE: self.phases, CONDITION: self.conditions}
-        return {**own, **self.targets, **self.crossed}.get(column, ())
-
     @property
     def alike(self) -> bool:
         """Whether all phases have as many positions, so that positions can be compared."""

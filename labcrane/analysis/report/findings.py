@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import groupby, product
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,10 @@ from labcrane.analysis.report.outcomes import (
     SCORE_OCCASIONS,
     SEQUENCE,
     Plan,
+    StudyMovements,
+    Test,
     after_conditions,
+    between_phases,
     contrasts,
     measures_in,
     named_factor,
@@ -26,17 +29,17 @@ from labcrane.analysis.report.outcomes import (
     plans,
     practice_words,
     practised,
-    table_of,
+    row_of,
     trend_confounded,
 )
 from labcrane.analysis.statistics.anova import (
     LEAST,
     Anova,
-    Contrast,
     FactorialDesign,
+    analyse,
     word,
 )
-from labcrane.analysis.statistics.time_scales import FROM_BEFORE
+from labcrane.analysis.statistics.time_scales import FROM_BEFORE, adjusted, quantities, summary
 from labcrane.analysis.statistics.trends import Trend, holm, linear_trend
 
 if TYPE_CHECKING:
@@ -104,7 +107,7 @@ class StudyFinding:
     table: str
     measure: str
     effect: str
-    test: Anova | Contrast | Trend | Mapping[str, Any] | None
+    test: Test | None
     short: tuple[Shortfall, ...] = ()
     columns: tuple[str, ...] = ()
     plan: Plan = NO_PLAN
@@ -166,9 +169,10 @@ class Results:
 
     def table(self, name: str) -> "pd.DataFrame":
         """Return one of the report's tables of tests."""
+        import pandas as pd
+
         tests = [one.test for one in self.findings if one.table == name]
-        made = [test for test in tests if isinstance(test, Anova | Contrast | Trend)]
-        return table_of(made, self.factors)
+        return pd.DataFrame([row_of(test, self.factors) for test in tests if test is not None])
 
     def shortfalls(self) -> "pd.DataFrame":
         """Return what tests lack as a table; empty if all are of all participants and levels."""
@@ -187,27 +191,12 @@ class Results:
         return number if unit in {"", "1"} else f"{number} {unit}"
 
 
-def of_outcomes(
-    results: "pd.DataFrame",
-    recorded: "pd.DataFrame",
-    factors: Factors,
-    primary: Sequence[str] = (),
-) -> Iterator[StudyFinding]:
-    """Yield every test of every outcome over positions, distances, sides, phases and groups.
-
-    Parameters
-    ----------
-    results
-        Movements that are results, with factors.
-    recorded
-        All that count, to tell what failed from what was never recorded.
-    """
-    for measure in measures_in(results, primary):
+def of_outcomes(study: StudyMovements) -> Iterator[StudyFinding]:
+    """Yield every test of every outcome over positions, distances, sides, phases and groups."""
+    for measure in study.measures:
         tested: set[str] = set()
-        for plan in plans(results, factors):
-            for finding in _Run(
-                "anova", plan, measure, plan.of(results), plan.of(recorded), factors
-            ).findings():
+        for plan in plans(study.results, study.factors):
+            for finding in _run("anova", plan, measure, study):
                 if finding.test is not None:
                     tested.add(finding.effect)
                 elif plan.beside and finding.effect.removesuffix(ADJUSTED) not in tested:
@@ -215,20 +204,21 @@ def of_outcomes(
                 yield finding
 
 
-def of_gaze_measures(
-    results: "pd.DataFrame", recorded: "pd.DataFrame", factors: Factors
-) -> Iterator[StudyFinding]:
+def _run(table: str, plan: Plan, measure: str, study: StudyMovements) -> Iterator[StudyFinding]:
+    done, recorded = plan.of(study.results), plan.of(study.recorded)
+    return _PlanRun(table, plan, measure, done, recorded, study.factors).findings()
+
+
+def of_gaze_measures(study: StudyMovements) -> Iterator[StudyFinding]:
     """Yield the tests of how long each area was looked at, over groups, phases and distances."""
-    plan = Plan((*factors.over_phases, DISTANCE))
-    for measure in of_gaze(results):
-        yield from _Run("gaze_tests", plan, measure, results, recorded, factors).findings()
+    plan = Plan((*study.factors.over_phases, DISTANCE))
+    for measure in of_gaze(study.results):
+        yield from _run("gaze_tests", plan, measure, study)
 
 
-def of_contrasts(
-    results: "pd.DataFrame", factors: Factors, primary: Sequence[str] = ()
-) -> Iterator[StudyFinding]:
+def of_contrasts(study: StudyMovements) -> Iterator[StudyFinding]:
     """Yield the differences of two levels; the test of all levels names who is missing."""
-    for one in contrasts(results, factors, primary):
+    for one in contrasts(study):
         yield StudyFinding("contrasts", one.measure, one.factor, one)
 
 
@@ -241,7 +231,7 @@ def of_practice(
     done = practised(everything)
     recorded = everything.assign(practice=practice_words(everything))
     for measure in measures_in(done, primary):
-        run = _Run("practice", Plan((PRACTICE,)), measure, done, recorded, factors)
+        run = _PlanRun("practice", Plan((PRACTICE,)), measure, done, recorded, factors)
         for finding in run.findings():
             if PRACTICE in finding.columns:
                 yield finding
@@ -256,48 +246,32 @@ def of_scores(scores: "pd.DataFrame", factors: Factors) -> Iterator[StudyFinding
     for outcome, own in occasions(scores, factors.people).groupby("outcome"):
         name = str(outcome)
         table = own.rename(columns={"value": name})
-        yield from _Run("score_tests", SCORE_OCCASIONS, name, table, table, factors).findings()
+        yield from _PlanRun("score_tests", SCORE_OCCASIONS, name, table, table, factors).findings()
         behind = after_conditions(table)
         each = behind.groupby("participant")[CONDITION].nunique()
         if each.max() > 1:  # else it was asked after one of them
-            run = _Run("score_tests", SCORE_CONDITIONS, name, behind, behind, factors)
+            run = _PlanRun("score_tests", SCORE_CONDITIONS, name, behind, behind, factors)
             yield from run.findings()
 
 
-def of_trends(
-    results: "pd.DataFrame",
-    recorded: "pd.DataFrame",
-    factors: Factors,
-    primary: Sequence[str] = (),
-) -> list[StudyFinding]:
+def of_trends(study: StudyMovements) -> list[StudyFinding]:
     """Return the linear trends over positions in each phase; of primary outcomes, all share Holm.
 
     If none is named as primary, every outcome is.
     """
-    measures = measures_in(results, primary)
-    several = [phase for phase in factors.phases if factors.places[phase] > 1]
-    found = [
-        _of_trend(results, recorded, measure, phase, factors)
-        for measure in measures
-        for phase in several
-    ]
+    several = [phase for phase in study.factors.phases if study.factors.places[phase] > 1]
+    found = [_of_trend(study, measure, phase) for measure in study.measures for phase in several]
     tests = [(at, one.test) for at, one in enumerate(found) if isinstance(one.test, Trend)]
-    corrected = [(at, one) for at, one in tests if one.measure in (primary or measures)]
+    corrected = [(at, one) for at, one in tests if one.measure in (study.primary or study.measures)]
     p_holm = holm([one.p for _, one in corrected])
     for (at, one), p in zip(corrected, p_holm, strict=True):
         found[at] = replace(found[at], test=replace(one, p_holm=p))
     return found
 
 
-def _of_trend(
-    results: "pd.DataFrame",
-    recorded: "pd.DataFrame",
-    measure: str,
-    phase: str,
-    factors: Factors,
-) -> StudyFinding:
-    name, people = f"linear trend of {SEQUENCE} in {phase}", factors.people
-    own = results[results[PHASE] == phase].assign(sequence=lambda table: table[PLACE])
+def _of_trend(study: StudyMovements, measure: str, phase: str) -> StudyFinding:
+    name, people = f"linear trend of {SEQUENCE} in {phase}", study.factors.people
+    own = study.results[study.results[PHASE] == phase].assign(sequence=lambda table: table[PLACE])
     places = own.dropna(subset=[measure]).groupby("participant")["sequence"].nunique()
     several = set(map(str, places[places > 1].index))
     trend = linear_trend(own, measure)
@@ -307,37 +281,54 @@ def _of_trend(
         why += f", and {LEAST} are needed" if few else ", whose slopes do not differ"
         short = Shortfall("", len(people), len(several), why)
         return StudyFinding("trends", measure, name, None, (short,))
-    confounded = trend_confounded(results, measure, phase, trend.people)
-    there = set(recorded.loc[recorded[PHASE] == phase, "participant"])
+    confounded = trend_confounded(study.results, measure, phase, trend.people)
+    there = set(study.recorded.loc[study.recorded[PHASE] == phase, "participant"])
     why_not = {True: "values at fewer than two positions", False: f"{NOTHING} in {phase}"}
     reasons = {who: why_not[who in there] for who in people if who not in trend.people}
     told = replace(trend, phase=phase, confounded=confounded)
     return StudyFinding("trends", measure, name, told, without_people(reasons, people))
 
 
-def of_time_scales(
-    scales: "pd.DataFrame", recorded: "pd.DataFrame", factors: Factors
-) -> Iterator[StudyFinding]:
-    """Yield the quantities of the time scales over all groups, from the rows of their table."""
+def of_time_scales(study: StudyMovements) -> Iterator[StudyFinding]:
+    """Yield learning within phases and from one to the next, and its tests between groups."""
+    factors = study.factors
+    for measure in study.measures:
+        found = quantities(study.results, measure)
+        for each in summary(found, measure, factors.people).to_dict("records"):
+            row = {str(key): value for key, value in each.items()}
+            row["confounded"] = between_phases(study.results, row, found, factors)
+            short = _without_quantity(row, study)
+            yield StudyFinding(
+                "time_scales", measure, f"{row['quantity']} of {row['phase']}", row, short
+            )
+        for (phase, quantity), own in found.groupby(["phase", "quantity"], sort=False):
+            about = {"phase": phase, "quantity": quantity, "adjustment": adjusted(own)}
+            values = own.rename(columns={"value": measure})
+            for test in analyse(values, measure, (), factors.between):
+                row = row_of(test, factors) | about
+                yield StudyFinding("time_scales_by_group", measure, f"{quantity} of {phase}", row)
+
+
+def _without_quantity(row: Mapping[str, Any], study: StudyMovements) -> tuple[Shortfall, ...]:
+    """Return who has no such quantity; a row without a test says so itself."""
+    recorded, factors = study.recorded, study.factors
+    if row["why"] or row["group"] != "all":
+        return ()
+    phases = [row["phase"]]
+    if row["quantity"] in FROM_BEFORE:
+        phases.insert(0, factors.phases[factors.phases.index(row["phase"]) - 1])
     few = {"slope": "values at fewer than two positions", "change": "no value in a phase"}
-    for row in scales[scales["group"] == "all"].to_dict("records"):
-        measure, quantity, phase = (str(row[key]) for key in ("measure", "quantity", "phase"))
-        phases = [phase]
-        if quantity in FROM_BEFORE:
-            phases.insert(0, factors.phases[factors.phases.index(phase) - 1])
-        reasons = {}
-        for who in () if row["why"] else str(row["left_out"]).split():
-            mine = recorded[recorded["participant"] == who]
-            away = [each for each in phases if not (mine[PHASE] == each).any()]
-            why = few.get(quantity, "no value at a first or last position")
-            reasons[who] = f"{NOTHING} in {' and '.join(away)}" if away else why
-        test = {str(key): value for key, value in row.items()}
-        short = without_people(reasons, factors.people)
-        yield StudyFinding("time_scales", measure, f"{quantity} of {phase}", test, short)
+    reasons = {}
+    for who in row["left_out"].split():
+        mine = set(recorded.loc[recorded["participant"] == who, PHASE])
+        away = [phase for phase in phases if phase not in mine]
+        why = few.get(row["quantity"], "no value at a first or last position")
+        reasons[who] = f"{NOTHING} in {' and '.join(away)}" if away else why
+    return without_people(reasons, factors.people)
 
 
 @dataclass(frozen=True)
-class _Run:
+class _PlanRun:
     """A plan that is run for one measure: its tests, and what they lack.
 
     Attributes
@@ -374,26 +365,21 @@ class _Run:
 
     def findings(self) -> Iterator[StudyFinding]:
         """Yield the tests that can be made, and then those that cannot."""
-        plan, measure = self.plan, self.measure
+        plan, cells = self.plan, self._cells
+        finding = partial(StudyFinding, self.table, self.measure, plan=plan)
         planned = [columns for columns in plan.effects if set(columns) <= set(self._levels)]
-        for test in plan.tests(self._cells, measure):
-            columns = tuple(test.factor.split(":"))
+        tests = {tuple(test.factor.split(":")): test for test in plan.tests(cells, self.measure)}
+        for columns, test in tests.items():
             name, confounded = self._name(columns), ""
-            short: tuple[Shortfall, ...] = ()
             if columns == (plan.asked or tuple(each for each in columns if each != GROUP)):
-                confounded = plan.confounded(self.done, measure, test.people, columns)
-            if columns in planned:
-                planned.remove(columns)
-                short = self._without(columns)
-            told = replace(test, factor=name, confounded=confounded)
-            yield StudyFinding(self.table, measure, name, told, short, columns, plan)
+                confounded = plan.confounded(self.done, self.measure, test.people, columns)
+            short = self._without(columns) if columns in planned else ()
+            yield finding(name, replace(test, factor=name, confounded=confounded), short, columns)
+        whole = len(cells.people) + len(cells.alone)
         for columns in planned:
-            why = self._not_adjusted() if plan.beside else self._why(columns)
-            whole = len(self._cells.people) + len(self._cells.alone)
-            no_test = Shortfall("", len(self.factors.people), whole, why)
-            yield StudyFinding(
-                self.table, measure, self._name(columns), None, (no_test,), columns, plan
-            )
+            if columns not in tests:
+                no_test = Shortfall("", len(self.factors.people), whole, self._why(columns))
+                yield finding(self._name(columns), None, (no_test,), columns)
 
     def _name(self, columns: tuple[str, ...]) -> str:
         return named_factor(":".join(columns), self.factors) + self.plan.suffix
@@ -465,6 +451,10 @@ class _Run:
 
     def _why(self, columns: tuple[str, ...]) -> str:
         """Return why an effect cannot be tested."""
+        if self.plan.beside:  # positions can be, and not without what pairs of targets add
+            apart = self.plan.confounded(self.done, self.measure, self._cells.people)
+            few = "there are too few people to estimate their variance"
+            return f"positions cannot be distinguished from {apart}" if apart else few
         for column in columns:
             gone = self._gone(column)
             if gone and len(self._levels[column]) - len(gone) < 2:  # noqa: PLR2004 - to compare
@@ -484,13 +474,6 @@ class _Run:
         if len(groups) < 2 and GROUP in columns:  # noqa: PLR2004
             return f"all {whole} people with {have} are in group {groups.pop()}"
         return f"the {whole} people with {have} do not differ in the tested values"
-
-    def _not_adjusted(self) -> str:
-        """Return why positions can be tested, and not without what pairs of targets add."""
-        apart = self.plan.confounded(self.done, self.measure, self._cells.people)
-        if apart:
-            return f"positions cannot be distinguished from {apart}"
-        return "there are too few people to estimate their variance"
 
 
 def _first(said: Sequence[str]) -> str:

@@ -77,6 +77,15 @@ class Page:
             rows=rounded.to_html(index=False, border=0, na_rep="", escape=True, justify="inherit"),
         )
 
+    def rows(self, name: str, table: "pd.DataFrame", said: str = "", heading: str = "") -> None:
+        """Add a table with its heading and sentence; nothing if it has no rows."""
+        if len(table):
+            if heading:
+                self.heading(heading)
+            if said:
+                self.say(said)
+            self.table(name, table)
+
     def text(self, name: str, text: str) -> None:
         """Write a text into the page's folder, the footer in its first line, and link to it."""
         said = f"{self._footer}.\n\n" if self._footer else ""

@@ -1,6 +1,6 @@
 """Outcomes of a study in its design: planned tests, contrasts, time scales, questionnaires."""
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,6 @@ from labcrane.analysis.statistics.anova import (
     Anova,
     Contrast,
     FactorialDesign,
-    analyse,
     compare,
     design,
     effects_in,
@@ -31,9 +30,6 @@ from labcrane.analysis.statistics.confounding import told_apart
 from labcrane.analysis.statistics.time_scales import (
     FROM_BEFORE,
     TAKEN,
-    adjusted,
-    quantities,
-    summary,
 )
 from labcrane.analysis.statistics.trends import Trend
 
@@ -68,6 +64,9 @@ BESIDE_PHASES: Confusable = (
     ("the targets' width", ("width",)),
 )
 """What may change between sessions or blocks for all participants, in addition to learning."""
+
+Test = Anova | Contrast | Trend | Mapping[str, Any]
+"""A test, or the row of a quantity of the time scales."""
 
 OF_PHASES = {PHASE, SESSION, BLOCK, CONDITION, OCCASION}
 
@@ -164,6 +163,33 @@ SCORE_CONDITIONS = Plan((CONDITION,), (CONDITION,), confusable=((ORDER, (OCCASIO
 """Scores of questionnaires, over when they were asked, and over the conditions before."""
 
 
+@dataclass(frozen=True, slots=True)
+class StudyMovements:
+    """Movements of a study with their factors, which its tests are of.
+
+    Attributes
+    ----------
+    results
+        Those that are results.
+    recorded
+        All that count, to tell what failed from what was never recorded.
+    factors
+        Factors of the study, with all participants of the sample.
+    primary
+        Outcomes that the protocol names as primary.
+    """
+
+    results: "pd.DataFrame"
+    recorded: "pd.DataFrame"
+    factors: Factors
+    primary: Sequence[str] = ()
+
+    @property
+    def measures(self) -> list[str]:
+        """The recorded outcomes, the primary ones first."""
+        return measures_in(self.results, self.primary)
+
+
 def measures_in(results: "pd.DataFrame", primary: Sequence[str] = ()) -> list[str]:
     """Return the recorded outcomes, the primary ones first."""
     names = dict.fromkeys([*primary, *USUAL, *([TO_REST] if rests_apart(results) else [])])
@@ -245,13 +271,12 @@ def practice_words(movements: "pd.DataFrame") -> "pd.Series[str]":
     return movements["practice"].astype(float).map({0.0: "counted", 1.0: "practice"})
 
 
-def contrasts(
-    results: "pd.DataFrame", factors: Factors, primary: Sequence[str] = ()
-) -> list[Contrast]:
+def contrasts(study: StudyMovements) -> list[Contrast]:
     """Return differences of groups, of phases, and of groups in each phase, after Holm."""
+    results, factors = study.results, study.factors
     between, phases = factors.between, factors.over_phases
     found: list[Contrast] = []
-    for measure in measures_in(results, primary):
+    for measure in study.measures:
         found += compare(results, measure, GROUP, phases, between)
         for name in phases:
             of_phases = compare(results, measure, name, phases, between)
@@ -288,46 +313,27 @@ def trend_confounded(
     return plan.confounded(results, measure, people)
 
 
-def time_scale_tables(
-    results: "pd.DataFrame", factors: Factors, primary: Sequence[str] = ()
-) -> "tuple[pd.DataFrame, pd.DataFrame]":
-    """Return the summary of learning within and from phase to phase, and tests between groups."""
-    import pandas as pd
+def between_phases(
+    results: "pd.DataFrame", row: Mapping[str, Any], found: "pd.DataFrame", factors: Factors
+) -> str:
+    """Return the confounds of a quantity that goes from one phase to the next; empty if none.
 
-    tables, tests = [], []
-    for measure in measures_in(results, primary):
-        found = quantities(results, measure)
-        of_all = summary(found, measure, factors.people)
-        tables.append(of_all.assign(confounded=_between_phases(results, of_all, found, factors)))
-        if not factors.between:
-            continue
-        for (phase, quantity), own in found.groupby(["phase", "quantity"], sort=False):
-            about = {"phase": str(phase), "quantity": str(quantity)}
-            named = own.rename(columns={"value": measure})
-            made = table_of(analyse(named, measure, (), [GROUP]), factors)
-            tests.append(made.assign(**about, adjustment=adjusted(own)))
-    by_group = [table for table in tests if len(table)]
-    joined = pd.concat(by_group, ignore_index=True) if by_group else pd.DataFrame()
-    return pd.concat(tables, ignore_index=True), joined
-
-
-def _between_phases(
-    results: "pd.DataFrame", rows: "pd.DataFrame", found: "pd.DataFrame", factors: Factors
-) -> list[str]:
-    """Return for each row the confounds of a change from the phase before."""
-    words = []
-    for row in rows.to_dict("records"):
-        at = factors.phases.index(str(row["phase"]))
-        if row["quantity"] not in FROM_BEFORE or not at:
-            words.append("")
-            continue
-        own = found[(found["phase"] == row["phase"]) & (found["quantity"] == row["quantity"])]
-        if row["group"] != "all":
-            own = own[own["group"] == row["group"]]
-        two = results[results[PHASE].isin(factors.phases[at - 1 : at + 1])]
-        plan = Plan((), (PHASE,), confusable=BESIDE_PHASES)
-        words.append(plan.confounded(two, str(row["measure"]), set(own["participant"])))
-    return words
+    Parameters
+    ----------
+    row
+        The quantity's row in the table of the time scales.
+    found
+        The quantity of each participant.
+    """
+    at = factors.phases.index(str(row["phase"]))
+    if row["quantity"] not in FROM_BEFORE or not at:
+        return ""
+    own = found[(found["phase"] == row["phase"]) & (found["quantity"] == row["quantity"])]
+    if row["group"] != "all":
+        own = own[own["group"] == row["group"]]
+    two = results[results[PHASE].isin(factors.phases[at - 1 : at + 1])]
+    plan = Plan((), (PHASE,), confusable=BESIDE_PHASES)
+    return plan.confounded(two, str(row["measure"]), set(own["participant"]))
 
 
 def score_table(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
@@ -448,17 +454,15 @@ def of_gaze(results: "pd.DataFrame") -> list[str]:
     return [name for name in names if results[name].notna().any()]
 
 
-def table_of(found: Iterable[Anova | Contrast | Trend], factors: Factors) -> "pd.DataFrame":
-    """Return tests as a table, each with the participants who are not in it."""
-    import pandas as pd
-
-    rows = []
-    for one in found:
-        row: dict[str, Any] = asdict(one)
-        people = set(row.pop("people"))
-        row["left_out"] = " ".join(name for name in factors.people if name not in people)
-        if isinstance(one, Trend):
-            row[factors.kind] = row.pop("phase")
-            row["slope_low"], row["slope_high"] = row.pop("slope_ci")
-        rows.append(row)
-    return pd.DataFrame(rows).drop(columns="beside", errors="ignore")
+def row_of(test: Test, factors: Factors) -> dict[str, Any]:
+    """Return a test as a row of its table, with the participants who are not in it."""
+    if isinstance(test, Mapping):
+        return dict(test)
+    row: dict[str, Any] = asdict(test)
+    people = set(row.pop("people"))
+    row["left_out"] = " ".join(name for name in factors.people if name not in people)
+    row.pop("beside", None)
+    if isinstance(test, Trend):
+        row[factors.kind] = row.pop("phase")
+        row["slope_low"], row["slope_high"] = row.pop("slope_ci")
+    return row

@@ -1,6 +1,7 @@
 """The report of a study: one page, one page per participant, figures and tables."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,7 +41,6 @@ from labcrane.analysis.report.findings import (
     of_trends,
 )
 from labcrane.analysis.report.html import Page
-from labcrane.analysis.report.outcomes import measures_in
 from labcrane.analysis.report.protocols import in_words as protocols_in_words
 from labcrane.analysis.report.protocols import unlike_protocols
 from labcrane.analysis.report.sample import in_words, sample
@@ -96,51 +96,50 @@ def write_report(
     judge
         Returns how well a recorded track finds thresholds; by default it is not reported.
     """
-    import pandas as pd
-
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "participants").mkdir(exist_ok=True)
     one = partial(_one, settings=settings, folder=folder.resolve())
-    found = {}
-    for name, why, *tables in work(one, cohort.included, workers, scheduler):
-        if why is not None:
-            cohort = cohort.without(name, why.status, why.why)
-            if why.trace:
-                with (folder / FAULTS).open("a", encoding="utf-8") as kept:
-                    kept.write(f"{name}\n{why.trace}\n")
-            if leave_out is not None:
-                leave_out(name, why)
+    found: dict[str, PersonTables] = {}
+    for name, made in work(one, cohort.included, workers, scheduler):
+        if isinstance(made, PersonTables):
+            found[name] = made
         else:
-            found[name] = tables
+            cohort = cohort.without(name, made.status, made.why)
+            if made.trace:
+                with (folder / FAULTS).open("a", encoding="utf-8") as kept:
+                    kept.write(f"{name}\n{made.trace}\n")
+            if leave_out is not None:
+                leave_out(name, made)
         if progress is not None:
             progress(len(found), len(cohort.included))
-    in_order = [found[participant.name] for participant in cohort.included]
-    columns = zip(*in_order, strict=True)
-    movements, loops, syncs, answers, scores, thresholds, drifts, without = columns
-    everything = with_unseen_areas(pd.concat(movements, ignore_index=True))
+    of_each = {person.name: found[person.name] for person in cohort.included}
+    groups = {name: own.group for name, own in of_each.items()}
+    tables = _joined(list(of_each.values()))
+    everything = with_unseen_areas(tables.movements)
     kinds = kinds_of(cohort.included)
     page = Page(_title(cohort.included), folder / "report.html", folder, footer=kinds)
     _stamp(page, cohort.included)
     page.links({p.name: f"participants/{p.name}.html" for p in cohort.included})
     _who(page, cohort, everything)
-    groups = {
-        person.name: _group(own) for person, own in zip(cohort.included, movements, strict=True)
-    }
-    about = _sample(page, cohort, _joined(answers), groups)
+    about = _sample(page, cohort, tables.answers, groups)
     results, defined = None, _definitions(cohort, everything)
     if _is_aiming(everything[is_result(everything)]):
         units = dict(zip(defined["measure"], defined["unit"], strict=True))
-        results = _study(page, everything, _joined(scores), groups, about, _primary(cohort), units)
-    add_thresholds(page, _joined(thresholds), judge)
-    _drifts(page, _joined(drifts))
-    _unmeasured(page, _joined(without))
+        results = _study(page, everything, tables.scores, groups, about, _primary(cohort), units)
+    add_thresholds(page, tables.thresholds, judge)
+    _drifts(page, tables.drifts)
+    page.rows(
+        "unmeasured_gaze",
+        tables.unmeasured,
+        "These streams were recorded completely, but no measure uses them:",
+        "Gaze that is not measured",
+    )
     page.heading("Loop and clocks")
-    quality = pd.concat(loops, ignore_index=True), pd.concat(syncs, ignore_index=True)
-    page.table("loop_quality", quality[0])
-    _syncs(page, quality[1])
+    page.table("loop_quality", tables.loop)
+    _syncs(page, tables.sync)
     if unprobed:
         page.say(f"Used on request, though timestamp accuracy is unknown: {'; '.join(unprobed)}.")
-    page.lead(answer(cohort, everything, quality, about, results))
+    page.lead(answer(cohort, everything, (tables.loop, tables.sync), about, results))
     page.heading("Definitions")
     page.say(f"Settings of the measures: {settings.as_dict()}")
     page.say(_by_which_rule(everything))
@@ -149,41 +148,72 @@ def write_report(
     return page.write()
 
 
-def _joined(tables: "Sequence[pd.DataFrame]") -> "pd.DataFrame":
-    """Return tables as one; those without rows have no types to go by."""
+@dataclass(frozen=True, slots=True)
+class PersonTables:
+    """Tables of one participant, or of a cohort.
+
+    Attributes
+    ----------
+    movements
+        All trials with their measures, also those excluded from means.
+    loop, sync
+        Quality of the loop by session, and of external clocks by stream.
+    answers, scores, thresholds
+        Of questionnaires, and of tracks.
+    drifts, unmeasured
+        Of gaze: its drift in checks of the eye tracker, and streams that no measure uses.
+    """
+
+    movements: "pd.DataFrame"
+    loop: "pd.DataFrame"
+    sync: "pd.DataFrame"
+    answers: "pd.DataFrame"
+    scores: "pd.DataFrame"
+    thresholds: "pd.DataFrame"
+    drifts: "pd.DataFrame"
+    unmeasured: "pd.DataFrame"
+
+    @property
+    def group(self) -> str:
+        """The participant's group; empty if there is none, or no movement."""
+        return str(self.movements[GROUP].iloc[0]) if len(self.movements) else ""
+
+
+def _joined(of_each: Sequence[PersonTables]) -> PersonTables:
+    """Return tables of participants as those of the cohort."""
     import pandas as pd
 
-    filled = [table for table in tables if len(table)]
-    return pd.concat(filled, ignore_index=True) if filled else tables[0]
-
-
-def _group(own: "pd.DataFrame") -> str:
-    return str(own[GROUP].iloc[0]) if len(own) else ""
+    joined = {}
+    for field in fields(PersonTables):
+        tables = [getattr(one, field.name) for one in of_each]
+        filled = [table for table in tables if len(table)]  # others have no types to go by
+        joined[field.name] = pd.concat(filled, ignore_index=True) if filled else tables[0]
+    return PersonTables(**joined)
 
 
 def _one(
     participant: Participant, settings: MeasureSettings, folder: Path
-) -> "tuple[str, Unusable | None, *tuple[pd.DataFrame, ...]]":
-    """Write one participant's page; return name and tables.
-
-    These are movements, quality of loop and of clocks, answers, scores, thresholds, drifts of gaze
-    and gaze that is not measured. The second result is the reason why the data cannot be
-    used; then the tables are empty.
-    """
-    import pandas as pd
-
+) -> tuple[str, PersonTables | Unusable]:
+    """Write one participant's page; return the tables, or the reason why there are none."""
     try:
         with kept_open(participant.path):
             own = measures_of(participant, settings)
             if GROUP not in own:  # trials say it where the study has groups
                 own.insert(0, GROUP, str(participant.context.get("group", "")))
-            asked = (answers_of(participant), scores_of(participant), thresholds_of(participant))
-            gaze = fixations_of(participant), unmeasured_of(participant)
-            loop, sync = loop_quality(participant), sync_quality(participant)
-            _participant_page(participant, own, loop, sync, folder)
+            tables = PersonTables(
+                movements=own,
+                loop=loop_quality(participant),
+                sync=sync_quality(participant),
+                answers=answers_of(participant),
+                scores=scores_of(participant),
+                thresholds=thresholds_of(participant),
+                drifts=fixations_of(participant),
+                unmeasured=unmeasured_of(participant),
+            )
+            _participant_page(participant, tables, folder)
     except Exception as error:  # noqa: BLE001 - one recording never stops a cohort
-        return participant.name, Unusable.of(error), *([pd.DataFrame()] * 8)
-    return participant.name, None, own, loop, sync, *asked, *gaze
+        return participant.name, Unusable.of(error)
+    return participant.name, tables
 
 
 def _primary(cohort: Cohort) -> list[str]:
@@ -222,25 +252,19 @@ def _who(page: Page, cohort: Cohort, everything: "pd.DataFrame") -> None:
     page.say(f"{len(out)} of {len(everything)} movements are excluded from means.")
     page.table("excluded_movements", out)
     still = everything[without_onset(everything)]
-    if len(still):
-        page.say(
-            f"In {listed(still)} the movement has no onset: it was over before anything moved. "
-            "Their errors say where the machine was; accuracy and time measures exclude them."
-        )
-        page.table(
-            "without_onset",
-            still.reindex(
-                columns=["participant", "session", "trial", "attempt", "outcome", "error"]
-            ),
-        )
+    page.rows(
+        "without_onset",
+        still.reindex(columns=["participant", "session", "trial", "attempt", "outcome", "error"]),
+        f"In {listed(still)} the movement has no onset: it was over before anything moved. "
+        "Their errors say where the machine was; accuracy and time measures exclude them.",
+    )
 
 
 def _sample(page: Page, cohort: Cohort, answers: "pd.DataFrame", groups: dict[str, str]) -> str:
     """Add the participants and their protocols, and return them in words."""
     unlike = unlike_protocols(cohort)
     page.say(protocols_in_words(unlike))
-    if len(unlike):
-        page.table("protocols", unlike)
+    page.rows("protocols", unlike)
     people = sample(answers, groups)
     page.heading("Sample")
     page.table("sample", people)
@@ -260,21 +284,21 @@ def _study(
     """Add the results for the whole cohort, and return them."""
     everything = with_factors(everything)
     factors = factors_of(everything, groups)
-    results = everything[is_result(everything)]
-    recorded = everything[everything["practice"].astype(float) == 0.0]
     scores = outcomes.with_conditions(scores, everything)
-    scales, scales_by_group = outcomes.time_scale_tables(results, factors, primary)
+    recorded = everything[everything["practice"].astype(float) == 0.0]
+    results = everything[is_result(everything)]
+    study = outcomes.StudyMovements(results, recorded, factors, primary)
     found = Results(
         about,
         time_outs(everything, [*factors.between, *factors.by_phase, "distance"]),
         factors,
         findings=[
-            *of_outcomes(results, recorded, factors, primary),
-            *of_contrasts(results, factors, primary),
-            *of_trends(results, recorded, factors, primary),
-            *of_time_scales(scales, recorded, factors),
+            *of_outcomes(study),
+            *of_contrasts(study),
+            *of_trends(study),
+            *of_time_scales(study),
             *of_practice(everything, factors, primary),
-            *of_gaze_measures(results, recorded, factors),
+            *of_gaze_measures(study),
             *of_scores(scores, factors),
         ],
         primary=tuple(primary),
@@ -286,18 +310,19 @@ def _study(
         "in the median (Kaplan and Meier) time-outs are censored at the time limit."
     )
     page.table("time_outs", found.time_outs)
-    measures = measures_in(results, primary)
-    _movements(page, results, found, measures)
-    _statistics(page, found, measures, scales, scales_by_group)
-    for measure in measures:
+    _movements(page, results, found, study.measures)
+    _statistics(page, found, study.measures)
+    for measure in study.measures:
         _mixed(page, results.assign(sequence=results[PLACE]), measure)
     _gaze(page, results, found)
     if len(scores):
         page.heading("Questionnaires")
         page.table("scores", outcomes.score_table(scores, groups))
-        if len(by_condition := outcomes.condition_scores(scores, groups)):
-            page.say("By condition, for participants who answered after each of them:")
-            page.table("scores_by_condition", by_condition)
+        page.rows(
+            "scores_by_condition",
+            outcomes.condition_scores(scores, groups),
+            "By condition, for participants who answered after each of them:",
+        )
         page.table("score_tests", found.table("score_tests"))
     page.heading("What was not tested")
     if len(short := found.shortfalls()):
@@ -374,15 +399,9 @@ def _rests(results: "pd.DataFrame") -> str:
     )
 
 
-def _statistics(
-    page: Page,
-    found: Results,
-    measures: Sequence[str],
-    scales: "pd.DataFrame",
-    scales_by_group: "pd.DataFrame",
-) -> None:
+def _statistics(page: Page, found: Results, measures: Sequence[str]) -> None:
     """Add the tests of effects, contrasts, trends, time scales and practice."""
-    factors, anovas, trends = found.factors, found.tests("anova"), found.table("trends")
+    factors, anovas = found.factors, found.tests("anova")
     page.heading("Statistics")
     varies = [CONDITION] * bool(factors.conditions)
     varies += [outcomes.named_factor(name, factors) for name in factors.over_phases]
@@ -410,27 +429,22 @@ def _statistics(
         for note in confounding(anovas):
             page.say(note)
         page.table("anova", found.table("anova"))
-    if len(contrasts := found.table("contrasts")):
-        page.say("Pairwise differences; p_holm is corrected within a factor, at one level.")
-        page.table("contrasts", contrasts)
-    if len(trends):
-        page.say(
-            "Linear trends over the sequence; p_holm is corrected over those of primary outcomes."
-        )
-        page.table("trends", trends)
-    page.say(
+    scales = (
         "Two time scales: within a session or block, and from one to the next. Where adjustment "
         f"says {TAKEN}, a slope differs slightly from that of the trends above; participants "
         "without a first or last position or a session are left out of what needs it. "
         + "; ".join(f"{name}: {words}" for name, words in QUANTITIES.items())
         + "."
     )
-    page.table("time_scales", scales)
-    if len(scales_by_group):
-        page.table("time_scales_by_group", scales_by_group)
-    if len(practice := found.table("practice")):
-        page.say("Practice compared with counted movements.")
-        page.table("practice", practice)
+    for name, said in {
+        "contrasts": "Pairwise differences; p_holm is corrected within a factor, at one level.",
+        "trends": "Linear trends over the sequence; p_holm is corrected over those of primary "
+        "outcomes.",
+        "time_scales": scales,
+        "time_scales_by_group": "",
+        "practice": "Practice compared with counted movements.",
+    }.items():
+        page.rows(name, found.table(name), said)
 
 
 def _of_primary(primary: Sequence[str], measures: Sequence[str]) -> str:
@@ -444,7 +458,7 @@ def _of_primary(primary: Sequence[str], measures: Sequence[str]) -> str:
 
 def _gaze(page: Page, results: "pd.DataFrame", found: Results) -> None:
     """Add dwell times, and their tests."""
-    looked, tests = outcomes.gaze_table(results, found.factors), found.table("gaze_tests")
+    looked = outcomes.gaze_table(results, found.factors)
     if len(looked):
         page.heading("Gaze")
         page.say(
@@ -460,8 +474,7 @@ def _gaze(page: Page, results: "pd.DataFrame", found: Results) -> None:
                 "there, or missing."
             )
         page.table("gaze", looked)
-        if len(tests):
-            page.table("gaze_tests", tests)
+        page.rows("gaze_tests", found.table("gaze_tests"))
 
 
 def _drifts(page: Page, looked: "pd.DataFrame") -> None:
@@ -488,15 +501,6 @@ def _drifts(page: Page, looked: "pd.DataFrame") -> None:
             valid=("valid", "min"),
         ),
     )
-
-
-def _unmeasured(page: Page, streams: "pd.DataFrame") -> None:
-    """Add the recorded gaze streams that are not measured."""
-    if not len(streams):
-        return
-    page.heading("Gaze that is not measured")
-    page.say("These streams were recorded completely, but no measure uses them:")
-    page.table("unmeasured_gaze", streams)
 
 
 def _mixed(page: Page, results: "pd.DataFrame", measure: str) -> None:
@@ -582,13 +586,8 @@ def _definitions(cohort: Cohort, everything: "pd.DataFrame") -> "pd.DataFrame":
     return pd.DataFrame(rows, columns=["measure", "unit", "meaning"])
 
 
-def _participant_page(
-    participant: Participant,
-    own: "pd.DataFrame",
-    loop: "pd.DataFrame",
-    sync: "pd.DataFrame",
-    folder: Path,
-) -> None:
+def _participant_page(participant: Participant, tables: PersonTables, folder: Path) -> None:
+    own = tables.movements
     path = folder / "participants" / f"{participant.name}.html"
     page = Page(
         participant.name,
@@ -614,11 +613,13 @@ def _participant_page(
         page.table("movements", results[["trial", "sequence", "distance", *SHOWN]])
     page.heading("Exclusions")
     page.table("excluded_movements", exclusions(own))
-    if len(marks := annotations_of(participant)):
-        page.heading("Marks")
-        page.say("Annotations made in the viewer; times are from the first frame.")
-        page.table("annotations", marks.drop(columns=["participant", "time", "until"]))
+    page.rows(
+        "annotations",
+        annotations_of(participant).drop(columns=["participant", "time", "until"]),
+        "Annotations made in the viewer; times are from the first frame.",
+        "Marks",
+    )
     page.heading("Loop and clocks")
-    page.table("loop_quality", loop)
-    _syncs(page, sync)
+    page.table("loop_quality", tables.loop)
+    _syncs(page, tables.sync)
     page.write()

@@ -122,7 +122,11 @@ def paragraphs(results: Results, style: Style) -> list[str]:
         text = "; ".join(sentences) or "was not tested by an analysis of variance"
         more = shortfalls(own, style)
         more += [_trend(one.test, style, results) for one in own if isinstance(one.test, Trend)]
-        more += [_scale(one.test, style, results) for one in own if isinstance(one.test, Mapping)]
+        more += [
+            _scale(one.test, style, results)
+            for one in own
+            if one.table == "time_scales" and isinstance(one.test, Mapping)
+        ]
         more += [
             _contrast(one.test, style, results) for one in own if isinstance(one.test, Contrast)
         ]
@@ -259,7 +263,7 @@ def _scale(row: Mapping[str, Any], style: Style, results: Results) -> str:
         "difference score": "Difference score from the last position to the first of",
         "net gain": "Net gain from last position to last position, to",
     }
-    if row["quantity"] not in spoken:
+    if row["group"] != "all" or row["quantity"] not in spoken:
         return ""
     mean = results.quantity(_number(row["mean"], style), row["measure"])
     said = f"{spoken[row['quantity']]} {style.plain(str(row['phase']))}"

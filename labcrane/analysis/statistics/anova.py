@@ -187,7 +187,8 @@ def design(
     model, terms = _model(who, groups)
     shares = _shares(known, beside, levels, whole.index)
     people, single_people = (tuple(map(str, each)) for each in (whole.index, sorted(single)))
-    empty: list[Any] = [cell for cell in wide.columns if len(wide) and wide[cell].isna().all()]
+    lacking = zip(wide.columns, wide.isna().to_numpy().T, strict=True)
+    empty: list[Any] = [cell for cell, lacks in lacking if len(lacks) and lacks.all()]
     cells = tuple(cell if isinstance(cell, tuple) else (cell,) for cell in empty)
     return FactorialDesign(
         whole.to_numpy(float), levels, groups, model, terms, shares, people, single_people, cells
