@@ -5,12 +5,12 @@ from .cohort import Participant, find_cohort
 from .electrodes.mne import (
     EEG_READERS,
     GAP,
+    bridged,
     channel_types,
     eeg_streams,
     events_at,
     faults_of,
     to_mne,
-    untriggered,
     volts,
 )
 from .electrodes.sampled import Sampled, sampled
@@ -39,6 +39,7 @@ __all__ = [
     "answers_of",
     "asked_in",
     "beside_trials",
+    "bridged",
     "channel_types",
     "codebook_of",
     "eeg_streams",
@@ -58,7 +59,6 @@ __all__ = [
     "sampled",
     "scores_of",
     "to_mne",
-    "untriggered",
     "volts",
     "with_unseen_areas",
 ]

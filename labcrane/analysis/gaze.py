@@ -71,7 +71,7 @@ class Looks:
         held = self._held(start, stop)
         if not held[self.tracked].any():
             return math.nan
-        return float(held[np.array([name == area for name in self.area], bool)].sum())
+        return float(held[self._on(area)].sum())
 
     def valid(self, start: float, stop: float) -> float:
         """Return the share of the time from ``start`` to ``stop`` with known gaze, 0 to 1.
@@ -95,7 +95,7 @@ class Looks:
         A look lasts for ``least_s`` without a sample elsewhere, lost or missing.
         """
         held = self._held(start, stop)
-        on = np.array([name == area for name in self.area], bool) & (held > 0.0)
+        on = self._on(area) & (held > 0.0)
         going_on = np.concatenate([[False], on[:-1] & (np.diff(self.time) <= 2.0 * self._usual)])
         begins = np.flatnonzero(on & ~going_on)
         if not begins.size:
@@ -103,6 +103,10 @@ class Looks:
         lasts = np.add.reduceat(np.where(on, held, 0.0), begins)
         long = begins[lasts >= least_s - ROUNDING_S]
         return max(float(self.time[long[0]]), start) if long.size else math.nan
+
+    def _on(self, area: str) -> npt.NDArray[np.bool_]:
+        """Return which samples are known to be on an area, shape ``(n,)``."""
+        return np.array([name == area for name in self.area], bool) & self.tracked
 
     @property
     def _usual(self) -> float:

@@ -20,8 +20,9 @@ SIDES = {"left": LEFT, "l": LEFT, "right": RIGHT, "r": RIGHT}
 SHARES = frozenset({"normalized", "normalised", "norm", "1", "ratio"})
 """Units of a place as a share of a picture."""
 
-LOST_AT = (0.0, -1.0)
-"""Places, x and y alike, that trackers write where they have none."""
+LOST_AT = (0.0, -1.0, -32768.0, 1e8)
+"""Places, x and y alike, that trackers write where they have none; an EyeLink writes the last two
+(``MISSING_DATA``)."""
 
 _JOINED = re.compile("(left|right|gaze|screen|direction|por|pos|eye|pupil)")
 
@@ -110,7 +111,11 @@ def eyes_of(
     sides = [side_of(channel) for channel in channels]
     for x, (said, kind, side) in enumerate(zip(words, kinds, sides, strict=True)):
         unit = channels[x].unit.strip().lower()
-        if "pupil" in said or kind.startswith("pupil") or (units is not None and unit not in units):
+        if (
+            {"pupil", "per"} & set(said)
+            or kind.startswith("pupil")
+            or (units is not None and unit not in units)
+        ):
             continue
         y = None
         if "x" in said:
@@ -142,7 +147,7 @@ def is_pupil(channel: DescribedChannel) -> bool:
     said = _words(channel.label)
     joined = "".join(said) + " " + "".join(_words(channel.type))
     alone = [word for word in said if word not in SIDES]
-    return "diameter" in joined or "pupilsize" in joined or alone == ["pupil"]
+    return "diameter" in joined or "pupilsize" in joined or alone in (["pupil"], ["pupil", "area"])
 
 
 def is_confidence(channel: DescribedChannel) -> bool:

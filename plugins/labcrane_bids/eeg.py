@@ -9,11 +9,11 @@ import numpy as np
 from labcrane.analysis import (
     GAP,
     Sampled,
+    bridged,
     channel_types,
     faults_of,
     monitor_setting,
     sampled,
-    untriggered,
     volts,
 )
 from labcrane.recording import SessionRecord, Stream
@@ -71,7 +71,7 @@ def write_eeg(
     factors = np.where(electric, 1e6 * scale, scale)
     write_brainvision(
         path,
-        (untriggered(piece * factors, types) for piece in signal.pieces()),
+        (piece * factors for piece in bridged(signal, types)),
         signal.rate_hz,
         list(zip(signal.labels, units, strict=True)),
         _markers(table, signal),
@@ -90,7 +90,7 @@ def write_eeg(
 def eeg_description(about: Mapping[str, Any]) -> dict[str, Any]:
     """Return the description of the events of EEG, by that of the same ones beside motion."""
     kinds = about["trial_type"]
-    gap = {GAP: "samples are missing from this one on, for the duration"}
+    gap = {GAP: "samples are missing for the duration; a straight line bridges them"}
     hed = {GAP: f"(Experiment-control, Label/{GAP})"}
     return {
         **about,

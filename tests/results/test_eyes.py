@@ -10,7 +10,7 @@ from numpy.random import default_rng
 from labcrane import RecordingError, open_recording
 from labcrane.analysis.codebook import codebook_of
 from labcrane.analysis.cohort import find_cohort
-from labcrane.analysis.gaze import looks
+from labcrane.analysis.gaze import Looks, looks
 from labcrane.analysis.measures import MeasureSettings, measure_session, measures_of
 from labcrane.core import SignalChannel, eyes_of
 from labcrane.recording import Channel, SessionRecord, StreamHeader, XdfWriter
@@ -48,13 +48,13 @@ def truth(tmp_path_factory: pytest.TempPathFactory) -> Truth:
         columns, channels = [], []
         for side, share in zip(SIDES, (0.9, 0.03), strict=True):
             runs = np.repeat(random.random(len(time) // 12 + 1) < share, 12)[: len(time)]
-            why = random.integers(4, size=len(time))
+            why = random.integers(5, size=len(time))
             places[side] = random.uniform(1.0, 199.0, (len(time), 2))
             sure = random.uniform(LIMIT, 1.0, len(time))
             shown = places[side].copy()
-            for number, value in enumerate((np.nan, 0.0, -1.0)):
+            for number, value in enumerate((np.nan, 0.0, -1.0, -32768.0)):
                 shown[runs & (why == number)] = value
-            sure[runs & (why == 3)] = random.uniform(0.3, LIMIT - 0.01)
+            sure[runs & (why == 4)] = random.uniform(0.3, LIMIT - 0.01)
             seen[side] = ~runs
             columns += [shown[:, 1], sure, shown[:, 0]]
             channels += [Channel(f"{side}_gaze_y", "px"), Channel(f"{side} confidence"),
@@ -160,3 +160,26 @@ def test_a_place_is_the_first_x_with_its_y(
 ) -> None:
     found = eyes_of([SignalChannel(label) for label in labels])
     assert [(eye.x, eye.y) for eye in found] == ([] if place is None else [place])
+
+
+def test_pixels_per_degree_are_no_place_of_an_eye() -> None:
+    """An EyeLink's own program sends them beside both eyes; they were a third, cyclopean one."""
+    labels = ("leftEyeX", "leftEyeY", "rightEyeX", "rightEyeY", "leftPupilArea", "rightPupilArea")
+    degrees = ("pixelsPerDegreeX", "pixelsPerDegreeY")
+    eyes = eyes_of([SignalChannel(label, "pixels") for label in (*labels, *degrees)])
+    assert [(eye.side, eye.x, eye.y, eye.pupil) for eye in eyes] == [
+        ("left", 0, 1, 4),
+        ("right", 2, 3, 5),
+    ]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_area_that_the_tracker_is_not_sure_of_is_not_looked_at(seed: int) -> None:
+    random = default_rng(seed)
+    time = np.arange(0.0, 3.0, 0.01)
+    area = random.choice(["target", "", "crane"], len(time)).tolist()
+    tracked = random.random(len(time)) < 0.5
+    found = Looks(time, area, tracked, ["target", "crane"])
+    known = [at for at, name in enumerate(area) if name == "target" and tracked[at]]
+    assert found.dwell("target", 0.0, 3.0) == pytest.approx(0.01 * len(known))
+    assert found.first("target", 0.0, 3.0) == pytest.approx(time[known[0]])

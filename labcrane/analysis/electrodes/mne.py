@@ -1,6 +1,6 @@
 """MNE object of a stream of EEG, with the session's events at their samples."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any
 
@@ -36,9 +36,9 @@ ELECTRIC = ("eeg", "eog", "ecg", "emg")
 
 FAULT_COLUMNS = (("channel", object), ("kind", object), ("start", float), ("end", float))
 
-GAP = "BAD_ACQ_SKIP"
-"""Annotation of missing samples, as MNE's own readers call it: MNE leaves out epochs that overlap
-one, and filters the samples before it and after it separately."""
+GAP = "BAD_boundary"
+"""Annotation of missing samples: MNE leaves out epochs that overlap one. Under the name that MNE
+filters around, ``BAD_ACQ_SKIP``, each lost sample would end a stretch, and short ones ring."""
 
 FAULT = "fault"
 """Prefix of annotations of a channel's faults; it is not ``BAD``, which MNE applies to all
@@ -54,11 +54,11 @@ def eeg_streams(session: SessionRecord) -> list[Stream]:
 def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") -> "mne.io.RawArray":
     """Return a stream of EEG as MNE's ``Raw``, with the session's events as annotations.
 
-    Samples are as they were recorded; missing ones are NaN (0 in channels of triggers), and
-    ``BAD_ACQ_SKIP`` as long as they lasted. Each event is at the sample that was taken when it
-    happened, by the corrected clock; those outside of the recording are left out. Annotations are
-    called by labels (docs/markers.md). Several are at one sample, so choose those of one name
-    before epochs are made: ``mne.events_from_annotations(raw, regexp="^trial_start/")``.
+    Samples are as they were recorded. A straight line bridges missing ones (0 in channels of
+    triggers), with an annotation ``BAD_boundary`` as long as they lasted. Each event is at the
+    sample that was taken when it happened, by the corrected clock; those outside of the recording
+    are left out. Annotations are called by labels (docs/markers.md). Several are at one sample, so
+    choose those of one name before epochs are made: ``mne.events_from_annotations(raw, regexp="^trial_start/")``.
     Annotations made in the viewer are ``annotation/`` and their text; a text that begins with
     ``BAD`` is not prefixed. Faults that monitors reported on a channel are ``fault/`` and their
     kind, for that channel alone (``ch_names``): the analyst decides which channels are bad.
@@ -91,8 +91,9 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
     info = mne.create_info(list(signal.labels), signal.rate_hz, list(kinds))
     if (mains_hz := monitor_setting(session, "mains_hz")) is not None:
         info["line_freq"] = float(mains_hz)
-    scaled = untriggered(signal.data * volts(signal, chosen, unit), kinds)
-    raw = mne.io.RawArray(scaled.T, info, verbose="error")
+    scale = volts(signal, chosen, unit)
+    rows = np.concatenate([piece * scale for piece in bridged(signal, kinds)])
+    raw = mne.io.RawArray(rows.T, info, verbose="error")
     started = datetime.fromisoformat(str(session.attrs["started"]))
     zero = session.streams["state"].time[0]
     raw.set_meas_date(started + timedelta(seconds=float(signal.time[0] - zero)))
@@ -172,14 +173,12 @@ def channel_types(signal: Sampled, stream: Stream) -> tuple[str, ...]:
     return tuple(KINDS.get((kind or usual).upper(), "misc") for kind in signal.kinds)
 
 
-def untriggered(rows: FloatArray, kinds: Sequence[str]) -> FloatArray:
-    """Set missing samples of channels of triggers to 0, and return the rows.
-
-    MNE converts such channels to whole numbers, and would find a trigger where one is NaN.
-    """
+def bridged(signal: Sampled, kinds: Sequence[str]) -> Iterator[FloatArray]:
+    """Yield rows, a piece at a time: a straight line where samples are missing, in triggers 0."""
     stim = np.array(kinds) == "stim"
-    rows[:, stim] = np.nan_to_num(rows[:, stim])
-    return rows
+    for piece in signal.pieces(bridged=(~stim).tolist()):
+        piece[:, stim] = np.nan_to_num(piece[:, stim])
+        yield piece
 
 
 def volts(signal: Sampled, stream: Stream, unit: str = "") -> Any:

@@ -1,6 +1,6 @@
 """Sampled signal: a stream as rows at one rate, and the row of each time."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,6 +20,9 @@ LOST = 1.5
 
 EVEN = 0.2
 """Share by which most steps of dejittered timestamps may miss the usual one."""
+
+AROUND = 20
+"""Samples before and behind a long step of which the soonest tell how long a hole is."""
 
 SILENT_S = 1.0
 """Seconds without a sample from which on some are missing although timestamps come in bursts."""
@@ -75,15 +78,29 @@ class Sampled:
         """All rows in the channels' units, shape ``(n_rows, n_channels)``, kept in memory."""
         return np.concatenate([np.empty((0, len(self.labels))), *self.pieces()])
 
-    def pieces(self, rows: int = CHUNK) -> Iterator[FloatArray]:
-        """Yield :attr:`data` by at most so many rows, which are read from the file then."""
+    def pieces(self, rows: int = CHUNK, bridged: Sequence[bool] = ()) -> Iterator[FloatArray]:
+        """Yield :attr:`data` by at most so many rows, which are read from the file then.
+
+        Parameters
+        ----------
+        rows
+            The most rows of a piece.
+        bridged
+            For each channel, whether a straight line bridges its missing rows: filters and
+            resampling spread NaN over all of a channel. None are by default.
+        """
         for at in range(0, len(self), rows):
             until = min(at + rows, len(self))
             first, stop = np.searchsorted(self.rows, (at, until)).tolist()
-            values = self._stream.values(self.labels, first, stop)
-            piece = np.full((until - at, len(self.labels)), np.nan)
+            low, high = max(first - 1, 0), min(stop + 1, len(self.rows))
+            values = self._stream.values(self.labels, low, high)
+            there, piece = self.rows[first:stop], np.full((until - at, len(self.labels)), np.nan)
+            missing = np.setdiff1d(np.arange(at, until), there, assume_unique=True)
             for number, name in enumerate(self.labels):
-                piece[self.rows[first:stop] - at, number] = values[name]
+                piece[there - at, number] = values[name][first - low : stop - low]
+                if bridged and bridged[number]:
+                    filled = np.interp(missing, self.rows[low:high], values[name])
+                    piece[missing - at, number] = filled
             yield piece
 
     def at(self, times: FloatArray) -> FloatArray:
@@ -104,8 +121,12 @@ class Sampled:
         return np.where(inside, np.interp(times, self.time, self.rows), np.nan)
 
     def off_s(self) -> float:
-        """Return by how many seconds a sample's time misses that of its row, at most."""
-        return float(np.abs(self.time - self.start - self.rows / self.measured_hz).max())
+        """Return by how many seconds 99 % of samples miss the time of their row, at most.
+
+        A few stamps are late by themselves; their samples are not.
+        """
+        off = np.abs(self.time - self.start - self.rows / self.measured_hz)
+        return float(np.quantile(off, 0.99))
 
 
 def sampled(stream: Stream) -> Sampled:
@@ -169,14 +190,28 @@ def _period(time: FloatArray, starts: npt.NDArray[np.intp]) -> float:
 
 
 def _rows(time: FloatArray, starts: npt.NDArray[np.intp], period: float) -> npt.NDArray[np.intp]:
-    """Return the row of each sample: consecutive, and after a hole by the time since the first.
+    """Return the row of each sample: consecutive, but for the periods that a hole lasts.
 
-    Counted from the first, what is rounded does not add up over many holes. A hole has a row at
-    least.
+    Those are by which samples behind a long step stay late: a stamp that is late alone leaves no
+    hole. Lengths are added up before they are rounded, so that parts of periods do not add up.
+
+    Parameters
+    ----------
+    time
+        Of each sample, shape ``(n,)``, in seconds.
+    starts
+        The first sample, and those behind a long step.
+    period
+        Of the samples, in seconds.
     """
-    least = starts + np.arange(len(starts))
-    due = np.rint(time[starts] / period).astype(np.intp)
-    missing = least - starts + np.maximum.accumulate(due - least)
+    late = time / period - np.arange(len(time))
+    length = np.zeros(len(starts))
+    for number in range(1, len(starts)):
+        at = starts[number]
+        before = late[max(starts[number - 1], at - AROUND) : at].min()
+        beyond = float(late[at : at + AROUND].min() - before)
+        length[number] = beyond if beyond > 0.5 else 0.0  # noqa: PLR2004 - else it is no period
+    missing = np.rint(np.cumsum(length)).astype(np.intp)
     rows: npt.NDArray[np.intp] = np.arange(len(time))
     rows += np.repeat(missing, np.diff(starts, append=len(time)))
     return rows
