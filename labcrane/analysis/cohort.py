@@ -283,14 +283,29 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
         hollow = [_hollow(number, recording.session(number)) for number in recording.sessions]
         if None not in hollow:
             return Participant(folder.name, path, Status.UNREADABLE, str(hollow[0]))
+        contexts = {number: recording.session(number).context for number in recording.sessions}
+        if stranger := _stranger(folder.name, contexts):
+            return Participant(folder.name, path, Status.UNREADABLE, stranger)
+        study = next(str(context["study"]) for context in contexts.values() if context)
         status, why, kind = _judge(recording, folder.name)
     except StorageError:  # nothing is known of the file
         raise
     except (RecordingError, ProtocolError) as error:  # of the file, of the protocol in it
         return Participant(folder.name, path, Status.UNREADABLE, str(error))
-    return Participant(
-        folder.name, path, status, why, kind=kind, study=str(recording.attrs["study"])
-    )
+    return Participant(folder.name, path, status, why, kind=kind, study=study)
+
+
+def _stranger(name: str, contexts: Mapping[int, Mapping[str, Any]]) -> str:
+    """Return which session is of another person or study, as its own metadata says; else empty."""
+    known = {number: context for number, context in contexts.items() if context}
+    for number, context in known.items():
+        if context["participant"] != name:
+            return f"session {number} says that it is of {context['participant']}: take it out"
+    studies = {str(context["study"]): number for number, context in known.items()}
+    if len(studies) > 1:
+        found = ", ".join(f"session {number} of {study!r}" for study, number in studies.items())
+        return f"its sessions are of {len(studies)} studies, {found}: take out what is not of yours"
+    return ""
 
 
 def _hollow(number: int, session: SessionRecord) -> str | None:

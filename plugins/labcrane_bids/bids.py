@@ -107,7 +107,10 @@ class Bids(Exporter):
         write_tsv(at / "motion" / f"{named}_events.tsv", events)
         about = event_description(events, context, screen_of(session))
         write_json(at / "motion" / f"{named}_events.json", about)
-        streams = eeg_streams(session)
+        streams = [stream for stream in eeg_streams(session) if len(stream) > 1]
+        for stream in eeg_streams(session):
+            if stream not in streams:
+                self._without[stream.name, "no rate: fewer than two samples"] += 1
         for stream in streams:
             which = f"_acq-{self._labels(stream.name)}" if len(streams) > 1 else ""
             path = at / "eeg" / f"{named}{which}_eeg"

@@ -15,6 +15,7 @@ from scipy.io import loadmat
 from labcrane import open_recording
 from labcrane.analysis.measures import measure_session
 from labcrane.cli.app import main
+from labcrane.core import file_name_of
 
 FORMER = Path(__file__).parent / "former"
 NAMES = sorted(packed.name.partition(".")[0] for packed in FORMER.glob("*.h5.gz"))
@@ -131,7 +132,7 @@ class TestFormerSignals:
         tables = {path.name for path in (tmp_path / "tables" / "streams").glob("*.parquet")}
         for name in ("former EEG", "former Gaze"):
             assert len(of_matlab[name.replace(" ", "_")]["time"]) == len(session.streams[name].time)
-            assert f"P001-SIMULATED_ses-01_{name}.parquet" in tables
+            assert f"P001-SIMULATED_ses-01_{file_name_of(name)}.parquet" in tables
 
     def test_they_are_in_the_report(self, recorded: Path, tmp_path: Path) -> None:
         to = ["report", str(recorded.parents[1]), "--include", "simulated"]

@@ -53,6 +53,49 @@ def test_a_copy_under_another_name_is_left_out_and_named(
     )
 
 
+@pytest.mark.parametrize("whose", ["P001", "another study's"])
+def test_a_session_of_somebody_else_in_a_folder_is_left_out_and_named(
+    data: Path, tmp_path: Path, whose: str
+) -> None:
+    """Only the file's first session was asked: a second one of another person counted twice."""
+    for name in ("P001", "P002"):
+        shutil.copytree(data / name, tmp_path / "data" / name)
+    source = data / "P001"
+    if whose != "P001":
+        other = tmp_path / "other"
+        other.mkdir()
+        text = STUDY.replace("study: ", "study: another_", 1)
+        record(study(other, text), other / "data", "P002")
+        source = other / "data" / "P002"
+    for path in source.glob("ses-01*"):
+        name = path.name.replace("ses-01", "ses-02")
+        shutil.copyfile(path, tmp_path / "data" / "P002" / name)
+    assert main(["recover", str(tmp_path / "data" / "P002")]) == 0
+    found = find_cohort(tmp_path / "data")
+    assert [person.name for person in found.included] == ["P001"]
+    (stranger,) = found.unreadable
+    if whose == "P001":
+        assert stranger.why == "session 2 says that it is of P001: take it out"
+    else:
+        assert "its sessions are of 2 studies, session 1 of" in stranger.why
+
+
+def test_a_session_that_was_killed_at_its_start_makes_no_study_of_its_own(
+    data: Path, tmp_path: Path
+) -> None:
+    for name in ("P001", "P002"):
+        shutil.copytree(data / name, tmp_path / "data" / name)
+    here = tmp_path / "data" / "P002"
+    (here / "P002.h5").unlink()
+    for path in [*here.glob("ses-01*")]:
+        path.rename(here / path.name.replace("ses-01", "ses-02"))
+    (here / "ses-01_run.xdf").write_bytes(b"XDF:")
+    assert main(["recover", str(here)]) == 0
+    listed = find_cohort(tmp_path / "data", ["half-finished"]).listing()
+    assert "studies" not in " ".join(listed["why"])
+    assert set(listed["participant"]) == {"P001", "P002"}
+
+
 def test_people_of_two_studies_are_not_pooled(data: Path, tmp_path: Path) -> None:
     shutil.copytree(data / "P001", tmp_path / "data" / "P001")
     other = tmp_path / "other"

@@ -58,7 +58,8 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
     triggers), with an annotation ``BAD_boundary`` as long as they lasted. Each event is at the
     sample that was taken when it happened, by the corrected clock; those outside of the recording
     are left out. Annotations are called by labels (docs/markers.md). Several are at one sample, so
-    choose those of one name before epochs are made: ``mne.events_from_annotations(raw, regexp="^trial_start/")``.
+    choose those of one name before epochs are made:
+    ``mne.events_from_annotations(raw, regexp="^trial_start/")``.
     Annotations made in the viewer are ``annotation/`` and their text; a text that begins with
     ``BAD`` is not prefixed. Faults that monitors reported on a channel are ``fault/`` and their
     kind, for that channel alone (``ch_names``): the analyst decides which channels are bad.
