@@ -222,7 +222,13 @@ def _of_pattern(study: Study) -> Doubts:
     pattern, planned = study.protocol.participants.pattern, study.protocol.participants.planned
     place: Place = ("participants", "pattern")
     try:
-        pseudonyms(pattern, planned)
+        names = pseudonyms(pattern, planned)
+        if not all(re.search("[A-Za-z]", name) for name in names):
+            yield (
+                place,
+                f"the pattern '{pattern}' allows {names[0]}, a number, which consent refuses"
+                r"; add a letter, as in P\d{3}",
+            )
     except ProtocolError:
         yield (
             place,

@@ -45,6 +45,10 @@ Ticks = Generator[None, Frame, None]
 Attempts = Generator[None, Frame, Phase]
 
 
+MOST_STALLS = 3
+"""In so many attempts at a trial one after the other the session stalls; then a person decides."""
+
+
 class Sequencer:
     """Leads a session through its plan.
 
@@ -292,8 +296,14 @@ class Sequencer:
         self._enter()
 
     def _trial(self, block: PlannedBlock, trial: Trial) -> Attempts:
+        stalls = 0
         while (ended := (yield from self._attempt_at(block, trial))) in self._redone:
             trial = next_attempt(self._study, self._plan, trial)
+            stalls = stalls + 1 if ended is Phase.INTERRUPTED else 0
+            if stalls >= MOST_STALLS and self._waits:
+                self._held.hold(EXAMINER)
+            elif stalls >= MOST_STALLS:
+                self._held.ending.append("it stalled again and again in one trial")
         return ended
 
     def _attempt_at(self, block: PlannedBlock, trial: Trial) -> Attempts:

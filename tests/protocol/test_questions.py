@@ -305,9 +305,7 @@ def test_a_study_that_cannot_be_scored_is_asked_about_at_its_line(
     assert said.format(lacks=lacks) in asked.text if "{lacks}" in said else said in asked.text
     found = about(study, asked)
     assert line in text.splitlines()[found["line"] - 1]
-    path.write_text(
-        text.replace("\nsessions:", f"\nexpected: [{key}]\nsessions:"), encoding="utf-8"
-    )
+    path.write_text(text.replace("expected: [", f"expected: [{key}, "), encoding="utf-8")
     assert questions(load(path, discover(study=path))) == ()
 
 

@@ -203,7 +203,8 @@ def test_another_process_sees_the_streams_and_their_samples_are_the_files(tmp_pa
     text = SHORT.replace("study: rehearsal", f"study: s{os.getpid()}")
     study = a_study(tmp_path, text.replace("movements: 2", "movements: 1, limit_s: 2"))
     visit = Visit(study, "P001", 1, tmp_path / "data", simulated=True)
-    source = f"labcrane/s{os.getpid()}/P001-SIMULATED/ses-01"
+    source = f"labcrane/{visit.source}"
+    assert source.startswith(f"labcrane/s{os.getpid()}/P001-SIMULATED/ses-01/")
     # Whatever the consumer hears once it is connected must be in the file; it asks for so many.
     counts = {"state": 300, "input": 300, "markers": 2}
     asked = [

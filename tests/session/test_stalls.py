@@ -72,6 +72,24 @@ def test_a_movement_with_a_stall_is_interrupted_and_repeated_and_the_machine_res
     assert again.tick.due > held[-1].tick.due, "it begins when no missed tick is left"
 
 
+@pytest.mark.parametrize("waits", [True, False])
+def test_a_trial_that_stalls_in_each_attempt_is_not_repeated_for_ever(
+    study: Study, *, waits: bool
+) -> None:
+    """A task that took 0.3 s once in each attempt made 152 attempts of one trial in a minute."""
+    stalls = dict.fromkeys(range(100, 40_000, 90), 0.3)
+    start = {tick: [Command(Order.START)] for tick in (10, 20, 30)}
+    orders = start | {12_000: [Command(Order.END)]} if waits else {}
+    seen = rehearse(study, orders, waits=waits, clock=StallingClock(stalls))
+    ends = [event.data["outcome"] for event in seen.events("trial.end")]
+    assert ends.count("interrupted") == 3
+    if waits:
+        assert [event.data["by"] for event in seen.events("pause.start")] == ["examiner"]
+    else:
+        (end,) = seen.events("session.end")
+        assert "it stalled again and again in one trial" in str(end.data)
+
+
 def test_ticks_that_are_late_by_less_than_the_limit_catch_up(study: Study) -> None:
     plain = rehearse(study)
     dice = random.Random(4)
