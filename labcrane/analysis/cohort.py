@@ -286,7 +286,7 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
         contexts = {number: recording.session(number).context for number in recording.sessions}
         if stranger := _stranger(folder.name, contexts):
             return Participant(folder.name, path, Status.UNREADABLE, stranger)
-        study = next(str(context["study"]) for context in contexts.values() if context)
+        study = next((str(each["study"]) for each in contexts.values() if "study" in each), "")
         status, why, kind = _judge(recording, folder.name)
     except StorageError:  # nothing is known of the file
         raise
@@ -297,11 +297,10 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
 
 def _stranger(name: str, contexts: Mapping[int, Mapping[str, Any]]) -> str:
     """Return which session is of another person or study, as its own metadata says; else empty."""
-    known = {number: context for number, context in contexts.items() if context}
-    for number, context in known.items():
-        if context["participant"] != name:
-            return f"session {number} says that it is of {context['participant']}: take it out"
-    studies = {str(context["study"]): number for number, context in known.items()}
+    for number, context in contexts.items():
+        if (other := context.get("participant", name)) != name:
+            return f"session {number} says that it is of {other}: take it out"
+    studies = {str(each["study"]): at for at, each in contexts.items() if "study" in each}
     if len(studies) > 1:
         found = ", ".join(f"session {number} of {study!r}" for study, number in studies.items())
         return f"its sessions are of {len(studies)} studies, {found}: take out what is not of yours"
