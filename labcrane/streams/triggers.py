@@ -35,6 +35,10 @@ LOOKED_AT = LIMITS["trigger echo"].most
 STRAYS = 20
 """Codes a second that were never sent, and are written down all the same."""
 
+LEAST_REST = 0.125
+"""Part of the spacing for which a line rests at least: 2.5 ms by default, which a device with 500
+samples a second sees. A tick that is late clears the line late."""
+
 
 class _Line:
     """One trigger, and what was sent on it."""
@@ -53,7 +57,7 @@ class _Line:
         self.fault: str | None = None
         self.answers = False
         self.queue: deque[tuple[int, float]] = deque()
-        self.rested, self.free_at = True, -math.inf
+        self.rested, self.shown_until, self.free_at = True, -math.inf, -math.inf
         self.waiting: deque[tuple[int, float]] = deque(maxlen=WAITING)
         self.strays = STRAYS
         self.left_out = 0
@@ -77,12 +81,18 @@ class _Line:
     def next(self, now: float) -> tuple[int, float] | None:
         """Return the code whose turn it is, and when its tick was due; None where the line rests.
 
-        A device that samples its lines sees two codes only with a rest between.
+        A device that samples its lines sees two codes only with a rest between. A line that shows a
+        code for the first half of its spacing is cleared in the first tick behind that.
         """
-        if not (self.queue and self.rested and now >= self.free_at):
+        if not self.rested and now >= self.shown_until:
             self.rested = True
+            self.free_at = max(self.free_at, now + LEAST_REST * self.trigger.spacing_s)
             return None
-        self.rested, self.free_at = False, now + self.trigger.spacing_s
+        if not (self.queue and self.rested and now >= self.free_at):
+            return None
+        self.rested = False
+        self.shown_until = now + self.trigger.spacing_s / 2.0
+        self.free_at = now + self.trigger.spacing_s
         return self.queue.popleft()
 
 
