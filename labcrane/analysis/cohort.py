@@ -272,17 +272,17 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
         if behind := backlog(path):
             return Participant(folder.name, path, Status.UNREADABLE, "; ".join(behind.values()))
         recording = Recording(path)
+        if not recording.sessions:
+            return Participant(folder.name, path, Status.UNREADABLE, "holds no session")
+        hollow = [_hollow(number, recording.session(number)) for number in recording.sessions]
+        if None not in hollow:
+            return Participant(folder.name, path, Status.UNREADABLE, str(hollow[0]))
         if recording.participant != folder.name:
             why = (
                 f"says that it is of {recording.participant}: a copy, or in the wrong folder; "
                 f"remove it, or name its folder {recording.participant}"
             )
             return Participant(folder.name, path, Status.UNREADABLE, why)
-        if not recording.sessions:
-            return Participant(folder.name, path, Status.UNREADABLE, "holds no session")
-        hollow = [_hollow(number, recording.session(number)) for number in recording.sessions]
-        if None not in hollow:
-            return Participant(folder.name, path, Status.UNREADABLE, str(hollow[0]))
         contexts = {number: recording.session(number).context for number in recording.sessions}
         if stranger := _stranger(folder.name, contexts):
             return Participant(folder.name, path, Status.UNREADABLE, stranger)

@@ -202,7 +202,7 @@ class PanelCommands:
 def _side(sides: list[tuple[str, float]]) -> int | str:
     """Return 1 or -1 for the side that a lever is moved to, 0 for rest; else what is wrong.
 
-    Of two bits, 0 is no and 1 is yes; 2 is an error and 3 not available (SAE J1939-71).
+    The two bits mean: 0 no, 1 yes, 2 an error, 3 not available (SAE J1939-71).
     """
     for name, state in sides:
         if state not in {0, 1}:

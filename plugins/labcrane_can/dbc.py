@@ -107,7 +107,7 @@ def _states_a_range(signal: "Signal") -> bool:
 def _range(signal: "Signal") -> tuple[float, float]:
     """Return the least and the greatest value: as stated, else what its bits can hold.
 
-    Editors write ``[0|0]`` for a range that nobody has entered.
+    Editors write ``[0|0]`` where no range was entered.
     """
     if signal.minimum is not None and signal.maximum is not None:
         return float(signal.minimum), float(signal.maximum)

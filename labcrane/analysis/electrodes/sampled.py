@@ -210,7 +210,7 @@ def _rows(time: FloatArray, starts: npt.NDArray[np.intp], period: float) -> npt.
         at = starts[number]
         before = late[max(starts[number - 1], at - AROUND) : at].min()
         beyond = float(late[at : at + AROUND].min() - before)
-        length[number] = beyond if beyond > 0.5 else 0.0  # noqa: PLR2004 - else it is no period
+        length[number] = beyond if beyond > 0.5 else 0.0  # noqa: PLR2004 - less is not a period
     missing = np.rint(np.cumsum(length)).astype(np.intp)
     rows: npt.NDArray[np.intp] = np.arange(len(time))
     rows += np.repeat(missing, np.diff(starts, append=len(time)))
