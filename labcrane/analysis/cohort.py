@@ -178,7 +178,7 @@ def find_cohort(
     ProtocolError
         ``include`` names something else.
     RecordingError
-        There is no such folder, no usable participant is left, or they are of several studies.
+        There is no such folder, it has no usable participant, or participants of two studies.
     """
     wanted = {Status.COMPLETE, *(_includable(word) for word in include)}
     people = everyone(folder, struck)

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from docs.page import BASE, PROGRAMS, ROOT, Block, blocks
-from needs import missing
+from needs import need
 
 TASK = "{use: aiming, distances: [2], movements: 2}"
 OTHER = "{use: aiming, distances: [1.5, 2.5], movements: 4, limit_s: 7.6}"
@@ -70,8 +70,7 @@ def test_a_mean_on_a_page_is_of_counted_movements(
     page: str, language: str, participant: Path, tmp_path: Path
 ) -> None:
     found = of_means(page, language)
-    if any(missing(name) for block in found for name in block.needs):
-        pytest.skip("needs another program")
+    need(*(name for block in found for name in block.needs))
     (tmp_path / "P001.h5").write_bytes(participant.read_bytes())
     program, options, name = PROGRAMS.get(language, (sys.executable, "", "page.py"))
     (tmp_path / name).write_text("\n".join(block.text for block in found), encoding="utf-8")

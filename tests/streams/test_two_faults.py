@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from labcrane.clocks import correct
+from labcrane.clocks import Corrected, correct
 from labcrane.streams.sync.quality import Basis
 
 PROBED = list(Basis).index(Basis.PROBES)
@@ -137,6 +137,25 @@ def received(
     return np.maximum.accumulate(t + random.uniform(2e-3, 0.02) + delay - each) + each
 
 
+def of_receipt(
+    random: np.random.Generator,
+    t: np.ndarray,
+    stamped: np.ndarray,
+    rate: float,
+    *,
+    arrivals: bool,
+) -> Corrected:
+    """Return what is made of such stamps by another computer's clock, of a known mean delay."""
+    clock = some_clock(random)
+    return correct(
+        clock(stamped),
+        probes=clock.probes(random, t[-1]),
+        arrivals=pulled(random, stamped + 2e-4) if arrivals else None,
+        rate_hz=rate,
+        latency_s=float(np.mean(stamped - t)),
+    )
+
+
 @pytest.mark.parametrize("arrivals", [True, False])
 @pytest.mark.parametrize("seed", range(12))
 def test_stamps_on_receipt_state_their_delays_and_count_what_was_lost(
@@ -146,17 +165,11 @@ def test_stamps_on_receipt_state_their_delays_and_count_what_was_lost(
     random = np.random.default_rng([1, seed])
     rate, seconds = float(random.choice([100.0, 125.0, 250.0, 500.0])), random.uniform(100.0, 300.0)
     t = 1.0 + np.arange(int(rate * seconds)) / (rate * (1.0 + random.uniform(-5e-5, 5e-5)))
-    count, clock = len(t), some_clock(random)
+    count = len(t)
     lost = random.integers(count // 10, count - count // 10, int(random.choice([0, 1, 3, 10])))
     t = np.delete(t, lost)
     stamped = received(random, t)
-    corrected = correct(
-        clock(stamped),
-        probes=clock.probes(random, t[-1]),
-        arrivals=pulled(random, stamped + 2e-4) if arrivals else None,
-        rate_hz=rate,
-        latency_s=float(np.mean(stamped - t)),
-    )
+    corrected = of_receipt(random, t, stamped, rate, arrivals=arrivals)
     off, scatter = np.abs(corrected.time - t), stamped - t - np.mean(stamped - t)
     assert np.mean(off <= corrected.error) >= 0.95
     assert np.median(corrected.error) < 3.0 * np.quantile(scatter, 0.975)
@@ -182,14 +195,8 @@ def test_packets_that_were_lost_are_counted_where_samples_are_stamped_together(
     lost = random.integers(count // 10, count - count // 10, int(random.choice([0, 1, 5, 30])))
     t, sent = np.delete(t, lost, axis=0), np.delete(sent, lost)
     apart = random.choice([0.0, 1e-5]) * np.arange(size)
-    stamped, t, clock = np.add.outer(sent, apart).ravel(), t.ravel(), some_clock(random)
-    corrected = correct(
-        clock(stamped),
-        probes=clock.probes(random, t[-1]),
-        arrivals=pulled(random, stamped + 2e-4) if arrivals else None,
-        rate_hz=rate,
-        latency_s=float(np.mean(stamped - t)),
-    )
+    stamped, t = np.add.outer(sent, apart).ravel(), t.ravel()
+    corrected = of_receipt(random, t, stamped, rate, arrivals=arrivals)
     off = np.abs(corrected.time - t)
     assert np.mean(off <= corrected.error) >= 0.95
     if corrected.quality.uncounted:
