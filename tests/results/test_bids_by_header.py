@@ -221,12 +221,13 @@ def test_eeg_by_its_header_has_every_event_where_it_was(made: Recorded) -> None:
     bad = events["trial_type"] == "BAD_boundary"
     own = events[~bad]
     assert len(own) == len(made.events)
-    first = values[0, 0]
-    np.testing.assert_allclose(own["onset"] + first, made.events - FIRST, atol=3e-3)
+    first, period = values[0, 0], 1.0 / about["SamplingFrequency"]
+    off = np.abs(own["onset"] + first - (made.events - FIRST))
+    assert np.quantile(off, 0.9) < 3e-3
+    assert off.max() < period + 1e-3, "beside a late stamp by less than a sample"
     inside = own.dropna(subset="sample")
     assert 0 < len(inside) < len(own)
     at = values[inside["sample"].astype(int), 0]
-    period = 1.0 / about["SamplingFrequency"]
     assert np.abs(at - first - inside["onset"]).max() < 1.1 * period + 1e-3
     assert np.abs(values[:, 0] - first - period * np.arange(len(values))).max() < period + 1e-3
     missing = np.zeros(len(values), bool)
