@@ -379,9 +379,15 @@ def plan_session(
 
 
 def next_attempt(
-    study: Study, plan: SessionPlan, trial: Trial, attempt: int | None = None
+    study: Study, plan: SessionPlan, trial: Trial, attempt: int, start: Sequence[float] = ()
 ) -> Trial:
-    """Return ``trial`` once more, as its next attempt or a given one, with a seed of its own."""
-    attempt = attempt or trial.attempt + 1
+    """Return ``trial`` once more, as a given attempt with a seed of its own.
+
+    It begins with the joint angles ``start`` in rad, unless it is planned to begin with others or
+    none are given. Otherwise the path would begin where the last attempt was cut off.
+    """
     words = (study.protocol.study, plan.participant, plan.number, "trial", trial.number, attempt)
-    return Trial(trial.number, attempt, derive(*words), trial.planned)
+    planned = trial.planned
+    if start and planned.start_pose is None:
+        planned = replace(planned, start_pose=tuple(start))
+    return Trial(trial.number, attempt, derive(*words), planned)

@@ -29,6 +29,7 @@ from labcrane.protocol.study import Study
 from labcrane.recording.journal_reader import LoggedEvent, SessionLog, read_journal
 from labcrane.recording.paths import parts
 from labcrane.session.standing import EXAMINER, STOP
+from labcrane.types import FloatArray
 
 Policy = Literal["continue", "redo_trial", "redo_block"]
 
@@ -68,6 +69,8 @@ class Progress:
         Data of the trial that was under way when the process died; None between trials.
     angles
         Last joint angles in rad, shape ``(n_joints,)``; empty when there is no frame.
+    starts
+        Joint angles in rad at the start of the first attempt at every trial that was begun.
     time
         When the last frame was due, in seconds; None without one.
     answers
@@ -98,6 +101,7 @@ class Progress:
     begun: dict[int, Mapping[str, Any]] = field(default_factory=dict)
     interrupted: Mapping[str, Any] | None = None
     angles: tuple[float, ...] = ()
+    starts: dict[int, tuple[float, ...]] = field(default_factory=dict)
     time: float | None = None
     answers: dict[tuple[int, str], dict[str, Value]] = field(default_factory=dict)
     handed_in: set[tuple[int, str]] = field(default_factory=set)
@@ -261,7 +265,8 @@ def progress(journal: Path, joints: Sequence[str]) -> Progress:
         )
     log, _ = read_journal(found)
     time = float(log.time[-1]) if len(log.time) else None
-    so_far = Progress(angles=_last_angles(log, joints), time=time)
+    angles = _angles(log, joints)
+    so_far = Progress(angles=tuple(angles[-1].tolist()) if len(angles) else (), time=time)
     for event, closes in _with_closing(log.events):
         try:
             so_far.take(event.name, event.data, closes=closes)
@@ -271,6 +276,10 @@ def progress(journal: Path, joints: Sequence[str]) -> Progress:
                 f"that it needs ({error!r}), so the remaining trials are unknown; "
                 f"use labcrane recover {journal.parent} to save the recorded data"
             ) from error
+        if event.name == "trial.start" and event.data["trial"] not in so_far.starts:
+            at = int(np.searchsorted(log.time, event.time))
+            if at < len(angles) and np.isfinite(angles[at]).all():
+                so_far.starts[event.data["trial"]] = tuple(angles[at].tolist())
     return so_far
 
 
@@ -290,15 +299,17 @@ def _with_closing(events: Sequence[LoggedEvent]) -> Iterator[tuple[LoggedEvent, 
         yield event, not (ordered or (event.part, event.tick) in last_ticks)
 
 
-def _last_angles(log: SessionLog, joints: Sequence[str]) -> tuple[float, ...]:
+def _angles(log: SessionLog, joints: Sequence[str]) -> FloatArray:
+    """Return the joint angles of every frame in rad, shape ``(n_frames, n_joints)``.
+
+    It is empty when a joint was not recorded.
+    """
     columns = {(column.group, column.label): at for at, column in enumerate(log.columns)}
     wanted = [columns.get(("state", f"joint.angle.{joint}")) for joint in joints]
-    last = None
-    for block in log.blocks():
-        last = block[-1].copy()
-    if last is None or None in wanted:
-        return ()
-    return tuple(float(last[at]) for at in wanted if at is not None)
+    found = [at for at in wanted if at is not None]
+    if len(found) < len(wanted):
+        return np.empty((0, len(joints)))
+    return np.vstack([np.empty((0, len(joints))), *(block[:, found] for block in log.blocks())])
 
 
 def check_recorded(plan: SessionPlan, so_far: Progress) -> None:
@@ -440,14 +451,15 @@ def _rest(
     begun = [trial.number for trial in block.trials if trial.number in so_far.attempts]
     if policy == "redo_block" and left and begun:
         attempt = 1 + max(so_far.attempts[number] for number in begun)
-        again = [next_attempt(study, plan, trial, attempt) for trial in block.trials]
+        first = _once_more(study, plan, block.trials[0], so_far, attempt)
+        again = [first, *(next_attempt(study, plan, each, attempt) for each in block.trials[1:])]
         before = _warm_up(plan, block, so_far, but=block)
         return replace(block, trials=tuple(again), streak=before.streak)
     if policy == "continue":
         cut_off = so_far.broken | ({so_far.interrupted["trial"]} if so_far.interrupted else set())
         left = [trial for trial in left if trial.number not in cut_off]
     again = [
-        next_attempt(study, plan, trial, so_far.attempts[trial.number] + 1)
+        _once_more(study, plan, trial, so_far, so_far.attempts[trial.number] + 1)
         if trial.number in so_far.attempts
         else trial
         for trial in left
@@ -455,6 +467,14 @@ def _rest(
     owed = tuple(_owed(block, so_far))
     unjudged = _unjudged(block, so_far, again)
     return replace(block, trials=tuple(again), owed=owed, streak=warm_up.streak, unjudged=unjudged)
+
+
+def _once_more(
+    study: Study, plan: SessionPlan, trial: Trial, so_far: Progress, attempt: int
+) -> Trial:
+    """Return another attempt at a trial, which begins where the first one began."""
+    start = so_far.starts.get(trial.number, ())
+    return next_attempt(study, plan, trial, attempt, within_limits(study, start) if start else ())
 
 
 def _unjudged(block: PlannedBlock, so_far: Progress, left: Sequence[Trial]) -> int:
@@ -565,7 +585,7 @@ def done_before(whole: SessionPlan, so_far: Progress, left: SessionPlan) -> int:
     return sum(trial.number in so_far.done and trial.number not in again for trial in whole.trials)
 
 
-def within_limits(study: Study, angles: Sequence[float]) -> tuple[float, ...]:
+def within_limits(study: Study, angles: Sequence[float] | FloatArray) -> tuple[float, ...]:
     """Return recorded joint angles as a pose that the machine can be set to.
 
     An engine lets a joint stand a few hundredths of a degree beyond its limit; it is set to the

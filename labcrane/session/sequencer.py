@@ -9,6 +9,7 @@ from math import inf
 
 from labcrane.core.clock import Tick
 from labcrane.core.records import UNDONE, Event, Frame, Phase, Trial, Value
+from labcrane.core.signals import Layout
 from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
 from labcrane.design.practice import WarmUp
 from labcrane.participants.personal_data import personal
@@ -37,7 +38,7 @@ from labcrane.session.commands import (
 from labcrane.session.live_settings import FeedbackSettings
 from labcrane.session.pause import DISK, INPUT, Suspenders
 from labcrane.session.questionnaire import QuestionnaireRun
-from labcrane.session.resume import COMPLETE, INCOMPLETE, Ledger, owed_text
+from labcrane.session.resume import COMPLETE, INCOMPLETE, Ledger, owed_text, within_limits
 from labcrane.session.standing import EXAMINER, STOP, SessionStage, Standing, why_not
 from labcrane.session.trial import TrialRun
 
@@ -84,6 +85,8 @@ class Sequencer:
         self._study = study
         self._plan = plan
         self._rig = rig
+        state = Layout("the machine", rig.dynamics.signals)
+        self._angles = [state.index(f"joint.angle.{name}") for name in study.machine.names]
         self._waits = waits
         self._rate_hz = study.protocol.rate_hz
         self._settings = FeedbackSettings({**study.cues, **study.sounds})
@@ -297,8 +300,9 @@ class Sequencer:
 
     def _trial(self, block: PlannedBlock, trial: Trial) -> Attempts:
         stalls = 0
+        start = self._pose()
         while (ended := (yield from self._attempt_at(block, trial))) in self._redone:
-            trial = next_attempt(self._study, self._plan, trial)
+            trial = next_attempt(self._study, self._plan, trial, trial.attempt + 1, start)
             stalls = stalls + 1 if ended is Phase.INTERRUPTED else 0
             if stalls >= MOST_STALLS and self._waits:
                 self._held.hold(EXAMINER)
@@ -327,6 +331,10 @@ class Sequencer:
         if trial.planned.counted:
             self._warm_up.count(block, attempt.phase)
         return attempt.phase
+
+    def _pose(self) -> tuple[float, ...]:
+        """Return the present joint angles in rad."""
+        return within_limits(self._study, self._rig.dynamics.state()[self._angles])
 
     def _keep_what_was(self) -> None:
         """Part the frame of this tick, not yet written, from arrays that a new trial resets."""

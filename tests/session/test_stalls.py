@@ -160,7 +160,7 @@ def test_a_recording_with_stalls_is_replayed_bit_for_bit(
 ) -> None:
     dice = random.Random(7)
     plain = rehearse(study)
-    ticks = sorted(dice.sample(range(20, len(plain.frames) - 20), 4))
+    ticks = sorted(dice.sample(range(ticks_of(plain, 2)[2], len(plain.frames) - 20), 2))
     stalls = {tick: LIMIT_S + dice.uniform(0.01, 3.0) for tick in ticks}
     monkeypatch.setattr(session_module, "_clock", lambda *_: StallingClock(stalls))
     visit = Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True)

@@ -327,7 +327,7 @@ class Stops(RuleBasedStateMachine):
         journal = parts(self.visit.journal)
         if not journal or self.torn:
             return
-        old = Progress()
+        old = Progress(starts=progress(self.visit.journal, self.visit.study.machine.names).starts)
         for event, closes in _with_closing(self.events):
             data = {key: event.data[key] for key in event.data if key not in {"done", "owed"}}
             if event.name != "session.resumed":
