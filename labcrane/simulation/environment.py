@@ -28,6 +28,7 @@ from labcrane.recording.journal import START, SessionJournal
 from labcrane.recording.participant_file.writer import consolidate
 from labcrane.recording.paths import journal_path, participant_path
 from labcrane.registry.registry import discover
+from labcrane.session import loop
 from labcrane.session.commands import Command, Order
 from labcrane.session.sequencer import Sequencer
 from labcrane.types import FloatArray
@@ -52,10 +53,9 @@ class PolicyInput(InputDevice):
 class _Session:
     """One participant's session under way."""
 
-    run: Run
     device: PolicyInput
-    rig: Rig
     sequencer: Sequencer
+    make_frame: loop.FrameMaker
     ticks: Iterator[Tick]
     frame: Frame
     log: FrameLog | None
@@ -179,17 +179,10 @@ class StudyEnvironment(gymnasium.Env[FloatArray, FloatArray]):
         sequencer = Sequencer(self._study, plan, rig, waits=False)
         self._sessions += 1
         clock = ManualClock()
-        frame = Frame(
-            tick=Tick(-1, 0.0, 0.0),
-            elapsed=0.0,
-            axes=device.axes,
-            command=rig.controller.idle(),
-            state=rig.dynamics.state(),
-            task=np.full(run.task.size, np.nan),
-        )
         log = None if self._record is None else self._journal(self._record, run)
         steps = ticks(clock, run.rate_hz)
-        self._session = _Session(run, device, rig, sequencer, steps, frame, log)
+        make_frame, frame = loop.frame_maker(rig, run, sequencer), loop.before(rig, run)
+        self._session = _Session(device, sequencer, make_frame, steps, frame, log)
         return self._session
 
     def _journal(self, folder: Path, run: Run) -> FrameLog:
@@ -213,19 +206,8 @@ class StudyEnvironment(gymnasium.Env[FloatArray, FloatArray]):
         return FrameLog(journal, run)
 
     def _tick(self, session: _Session, orders: tuple[Command, ...] = ()) -> Frame:
-        """Run one pass of the loop, as :func:`labcrane.session.loop.run` does."""
-        rig, sequencer = session.rig, session.sequencer
-        tick = next(session.ticks)
-        axes = rig.input.read(tick, session.frame)
-        sequencer.keep_time(tick, session.frame.tick)
-        sequencer.handle(orders, rig.input.fault, None)
-        moves = sequencer.moving
-        command = (
-            rig.controller.command(axes, rig.dynamics.state()) if moves else rig.controller.idle()
-        )
-        state = rig.dynamics.step(command, 1.0 / session.run.rate_hz)
-        frame = Frame(tick, 0.0, axes, command, state, np.full(session.run.task.size, np.nan))
-        sequencer.evaluate(frame)
+        """Pass through the loop once."""
+        frame = session.make_frame(next(session.ticks), session.frame, lambda: orders, None)
         if session.log is not None:
             session.log.write(frame)
         session.frame = frame
