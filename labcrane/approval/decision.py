@@ -120,6 +120,7 @@ def verify(study: Study, registry: Registry, today: date) -> Lock:
         installed packages are not and the protocol refuses that; the message has every difference
         on a line of its own.
     """
+    check_person(study)
     lock = read_lock(study.path)
     lock.check_date(today)
     if changes := drift(study, registry, lock):
@@ -140,9 +141,26 @@ def verify(study: Study, registry: Registry, today: date) -> Lock:
     return lock
 
 
+def check_person(study: Study) -> None:
+    """Make sure that a person moves the controls of a study.
+
+    Raises
+    ------
+    ProtocolError
+        Its input needs nobody, so that a recording would pass for a person's.
+    """
+    if not study.input.settings.person:
+        raise ProtocolError(
+            f"{study.path}: input: {study.input.name} moves the controls without a person; name "
+            "the controls of the participants (an input of labcrane plugins), and use --simulate "
+            "or --pilot to try the study without one"
+        )
+
+
 def _lock(
     study: Study, registry: Registry, grant: Grant, today: date, history: list[dict[str, object]]
 ) -> Lock:
+    check_person(study)
     if grant.valid_until < today:
         raise ProtocolError(
             f"the approval ended on {grant.valid_until}, today is {today}; give the day until "

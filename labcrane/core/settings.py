@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ValidationInfo
 
@@ -67,6 +67,10 @@ class Within:
 
 class Settings(StrictModel):
     """Base of every plugin's settings: unknown keys are errors, values never change."""
+
+    person: ClassVar[bool] = True
+    """For an input: whether a person moves it. One without a person is for pilots and simulations;
+    ``labcrane approve`` refuses it, and so does a session of a participant."""
 
     def reveals(self) -> tuple[str | Within, ...]:
         """Return the facts of the task's error that the component reveals to operators.

@@ -221,5 +221,7 @@ def _unknown(interface: str) -> str:
 class ReplaySettings(ValveMap):
     """A recorded bus, played again."""
 
+    person = False
+
     file: StudyPath
     """A log of candump, or in Vector's asc or blf format."""

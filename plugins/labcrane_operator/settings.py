@@ -28,6 +28,8 @@ class OperatorSettings(Settings):
     a study runs, not how people behave.
     """
 
+    person = False
+
     reaction_s: PositiveFloat = 0.35
     """Median time from seeing a target to the first movement, in seconds."""
 
@@ -127,6 +129,8 @@ class OperatorSettings(Settings):
 
 class RecordedSettings(Settings):
     """Settings of :class:`RecordedInput`."""
+
+    person = False
 
     file: Path
     """A participant file; a relative path counts from the folder in which labcrane runs."""

@@ -92,6 +92,8 @@ class ErrorSettings(Settings):
 class PanelOperatorSettings(Settings):
     """A simulated operator at a control panel. Its values are assumed, not measured."""
 
+    person = False
+
     gain_per_s: PositiveFloat = 1.2
     """Tip speed per distance from the goal, in 1/s."""
 

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import pytest
 from governance.approved_lab import approved_lab, refusal
-from governed import TODAY, Lab, edit
+from governed import PERSON, TODAY, Lab, edit
 
 from labcrane import ProtocolError
 from labcrane.approval.decision import Grant, amend, approve
 from labcrane.approval.lock import lock_path, read_lock
+from labcrane.core.roles import InputDevice
 from labcrane.registry.registry import discover
-from labcrane.session.eligibility import check_eligibility
+from labcrane.session.eligibility import EXEMPT, check_eligibility
 
 
 @pytest.fixture
@@ -87,7 +88,7 @@ def test_an_impossible_grant_is_refused(
     (tmp_path / "consent.txt").write_text("x", encoding="utf-8")
     grant = Grant("B", "R", TODAY + timedelta(until), lab.folder / consent)
     with pytest.raises(ProtocolError, match=said):
-        approve(lab.study, discover(), grant, TODAY)
+        approve(lab.study, lab.registry, grant, TODAY)
     assert not lock_path(lab.protocol).exists()
 
 
@@ -95,7 +96,7 @@ def test_an_amendment_says_what_was_changed_and_keeps_the_history(lab: Lab) -> N
     first = read_lock(lab.protocol)
     edit(lab.protocol, "movements: 1", "movements: 2")
     grant = Grant("Ethics board", "KB-12/2026-A1", TODAY + timedelta(700), first.consent)
-    amended = amend(lab.study, discover(), grant, "more movements", TODAY)
+    amended = amend(lab.study, lab.registry, grant, "more movements", TODAY)
     (entry,) = read_lock(lab.protocol).amendments
     assert entry["why"] == "more movements"
     assert entry["reference"] == "KB-12/2026-A1"
@@ -105,19 +106,42 @@ def test_an_amendment_says_what_was_changed_and_keeps_the_history(lab: Lab) -> N
     kept = lab.folder / "study.lock.1.json"
     assert json.loads(kept.read_text(encoding="utf-8"))["seal"] == first.seal
     edit(lab.folder / "hello.md", "Hello", "Good morning")
-    again = amend(lab.study, discover(), grant, "friendlier", TODAY)
+    again = amend(lab.study, lab.registry, grant, "friendlier", TODAY)
     assert [entry["why"] for entry in again.amendments] == ["more movements", "friendlier"]
     assert again.amendments[1]["replaces"] == amended.seal
     with pytest.raises(ProtocolError, match="is as it was approved; there is nothing to amend"):
-        amend(lab.study, discover(), grant, "again", TODAY)
+        amend(lab.study, lab.registry, grant, "again", TODAY)
 
 
 def test_an_amended_consent_text_needs_a_new_consent(lab: Lab) -> None:
     edit(lab.folder / "consent_v2.txt", "at any time", "whenever I like")
     lock = read_lock(lab.protocol)
     grant = Grant("Ethics board", "A1", TODAY + timedelta(99), lock.consent)
-    amend(lab.study, discover(), grant, "clearer", TODAY)
+    amend(lab.study, lab.registry, grant, "clearer", TODAY)
     with pytest.raises(ProtocolError, match=r"has not consented to .*, only to version"):
         check_eligibility(lab.visit("P001"))
     lab.consent("P001")
     check_eligibility(lab.visit("P001"))
+
+
+def test_an_input_that_needs_nobody_is_refused_for_people_and_runs_as_a_pilot(
+    tmp_path: Path,
+) -> None:
+    lab = Lab(tmp_path)
+    lab.approve()
+    edit(lab.protocol, PERSON, "{use: simulated_operator}")
+    told = "simulated_operator moves the controls without a person; .*--simulate or --pilot"
+    with pytest.raises(ProtocolError, match=told):
+        check_eligibility(lab.visit("P001"))
+    with pytest.raises(ProtocolError, match=told):
+        amend(lab.study, lab.registry, lab.grant(), "nobody comes", TODAY)
+    lock_path(lab.protocol).unlink()
+    with pytest.raises(ProtocolError, match=told):
+        approve(lab.study, lab.registry, lab.grant(), TODAY)
+    assert check_eligibility(lab.visit("P001", pilot=True)) == EXEMPT
+
+
+def test_the_inputs_without_a_person_are_known() -> None:
+    offers = discover().offers[InputDevice].values()
+    alone = {offer.name for offer in offers if not offer.settings.person}
+    assert alone == {"can_replay", "recorded", "scenario_operator", "simulated_operator"}

@@ -16,6 +16,7 @@ import h5py
 import numpy as np
 import pytest
 from fresh_environment import run
+from governed import PERSON, put_stand_in
 from needs import needs
 
 from labcrane.approval import bundle_install
@@ -39,7 +40,8 @@ CALM = ["--participant", "P001", "--simulate", "--fast"]
 def study(folder: Path) -> Path:
     folder.mkdir()
     path = folder / "protocol.yaml"
-    text = PROTOCOL.replace("{use: dual_joystick}", "{use: simulated_operator}")
+    put_stand_in(folder)
+    text = PROTOCOL.replace("{use: dual_joystick}", PERSON)
     path.write_text(ANSWERED + text, encoding="utf-8")
     (folder / "consent.txt").write_text("I take part.\n", encoding="utf-8")
     return path
@@ -144,10 +146,11 @@ def test_neither_data_beside_the_study_nor_the_labs_key_are_in_its_bundle_or_loc
     )
     assert "what is in lab" not in str(materials(load(protocol, registry), registry))
     made = bundle(load(protocol, registry), registry, tmp_path / "stick")
-    assert made.files == ("crane.svg", "protocol.yaml")
+    assert made.files == ("crane.svg", "plugins/person.py", "protocol.yaml")
     there = {path.name for path in (tmp_path / "stick").rglob("*") if path.is_file()}
     assert there == {
         "protocol.yaml",
+        "person.py",
         "crane.svg",
         "requirements.txt",
         "bundle.json",

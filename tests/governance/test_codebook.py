@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from governed import GOVERNED, GROUPED, TODAY, Lab
+from governed import GOVERNED, GROUPED, PERSON, TODAY, Lab
 from rehearsal import ScriptedConsole, a_study
 
 import labcrane
@@ -23,7 +23,11 @@ from labcrane.design.plan import plan_session
 from labcrane.registry.registry import discover
 from labcrane.session.session import Visit, run
 
-FACTORS = GROUPED.replace("distances: [2]", "distances: [2, 3]").replace(", pairs: 1", "")
+FACTORS = (
+    GROUPED.replace("distances: [2]", "distances: [2, 3]")
+    .replace(", pairs: 1", "")
+    .replace(PERSON, "{use: dual_joystick}")
+)
 FRAMES = ("loop", "input", "command", "state", "task")
 
 
@@ -95,7 +99,7 @@ def test_the_methods_paragraph_says_what_was_approved_and_done(tmp_path: Path) -
         text.replace("movements: 1", "movements: 2"), encoding="utf-8"
     )
     grant = Grant("Ethics board", "A1", lab.grant().valid_until, lock.consent)
-    amended = methods(amend(lab.study, discover(), grant, "too easy", TODAY))
+    amended = methods(amend(lab.study, lab.registry, grant, "too easy", TODAY))
     assert f"and amended: A1 on {TODAY} (too easy)" in amended
 
 

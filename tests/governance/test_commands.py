@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from governed import GOVERNED, TODAY
+from governed import GOVERNED, TODAY, put_stand_in
 
 import labcrane
 from labcrane.cli.app import main
@@ -19,6 +19,7 @@ from labcrane.participants.register import Entry, changed
 def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "study.yaml").write_text(GOVERNED, encoding="utf-8")
+    put_stand_in(tmp_path)
     (tmp_path / "consent.txt").write_text("I take part.\n", encoding="utf-8")
     return tmp_path
 
@@ -215,6 +216,7 @@ def test_a_study_is_where_you_are_or_its_folder_its_protocol_or_its_data(
     folder = tmp_path / "my_study"
     (folder / "data").mkdir(parents=True)
     (folder / "protocol.yaml").write_text(GOVERNED, encoding="utf-8")
+    put_stand_in(folder)
     with changed(Places(folder / "data")) as register:
         register.study = "rehearsal"
         register.participants["P001"] = Entry(slot=1, seed=1, enrolled="2026-01-02")

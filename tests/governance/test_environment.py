@@ -12,7 +12,6 @@ from labcrane.approval.environment import _environment, changes, environment, fi
 from labcrane.approval.lock import read_lock
 from labcrane.errors import ProtocolError
 from labcrane.registry.entry_points import one_name
-from labcrane.registry.registry import discover
 from labcrane.session.eligibility import check_eligibility
 
 
@@ -114,7 +113,7 @@ def test_a_difference_is_in_the_record_where_the_protocol_does_not_refuse_it(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     edit(lab.protocol, "environment: refuse\n", "")
-    amend(lab.study, discover(), lab.grant(), "any package will do", TODAY)
+    amend(lab.study, lab.registry, lab.grant(), "any package will do", TODAY)
     see(monkeypatch, package(lab.folder / "two", "2.0"))
     admission = check_eligibility(lab.visit("P001"))
     assert admission.otherwise_installed == ("winch was 1.0, is 2.0",)
@@ -126,7 +125,7 @@ def test_an_amendment_takes_what_is_installed_now(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     see(monkeypatch, package(lab.folder / "two", "2.0"))
-    lock = amend(lab.study, discover(), lab.grant(), "a mended winch", TODAY)
+    lock = amend(lab.study, lab.registry, lab.grant(), "a mended winch", TODAY)
     assert lock.amendments[-1]["changes"] == ["environment: winch was 1.0, is 2.0"]
     assert check_eligibility(lab.visit("P001")).otherwise_installed == ()
 

@@ -19,7 +19,6 @@ from labcrane.approval.lock import lock_path, read_lock
 from labcrane.approval.materials import materials, referred
 from labcrane.approval.source_tree import hashes
 from labcrane.files.yaml import YamlFile
-from labcrane.registry.registry import discover
 
 
 @pytest.fixture
@@ -91,9 +90,9 @@ def compared(lab: Lab, data: dict[str, object], change) -> list[str]:
     protocol = YamlFile.read(study.path).data
     named = {**protocol, **data}
     study.path.write_text(json.dumps(named), encoding="utf-8")
-    before = materials(study, discover())
+    before = materials(study, lab.registry)
     change()
-    return differences(before, materials(study, discover()))
+    return differences(before, materials(study, lab.registry))
 
 
 def test_one_item_of_a_questionnaire_is_told_also_when_another_file_names_it(lab: Lab) -> None:
@@ -180,7 +179,7 @@ def test_one_byte_of_a_plugins_source_is_refused_and_its_caches_do_not_count(
 
 def test_every_plugin_that_the_protocol_names_is_locked_and_no_other(lab: Lab) -> None:
     used = read_lock(lab.protocol).content["materials"]["plugins"]
-    assert set(used) == {"aiming", "bullet", "operator", "schemes"}  # a person by the operator
+    assert set(used) == {"aiming", "bullet", "plugins/person.py", "schemes"}
     point = next(point for point in entry_points(group="labcrane") if point.name == "aiming")
     assert used["aiming"]["files"] == hashes(point.module)
     assert all(name.startswith("labcrane_aiming/") for name in used["aiming"]["files"])
@@ -201,10 +200,8 @@ def test_labcranes_own_source_is_locked(lab: Lab) -> None:
 def test_the_lock_holds_on_another_computer_under_another_path(lab: Lab, tmp_path: Path) -> None:
     """Another process, another folder, another installation of the very same source."""
     elsewhere = tmp_path / "another disk" / "Studien"
-    elsewhere.mkdir(parents=True)
-    for path in lab.folder.iterdir():
-        if path.is_file():
-            shutil.copy(path, elsewhere)
+    ignored = shutil.ignore_patterns("data", "__pycache__")
+    shutil.copytree(lab.folder, elsewhere, ignore=ignored)
     root = Path(__file__).parents[2]
     copies = tmp_path / "installed"
     ignore = shutil.ignore_patterns("__pycache__")
@@ -218,7 +215,7 @@ def test_the_lock_holds_on_another_computer_under_another_path(lab: Lab, tmp_pat
         "from labcrane.registry.registry import discover\n"
         "from labcrane.protocol.study import load\n"
         "from labcrane.approval.decision import verify\n"
-        "registry = discover()\n"
+        "registry = discover(study=Path(sys.argv[2]))\n"
         "print(verify(load(Path(sys.argv[2]), registry), registry, date.today()).seal)\n"
     )
     done = subprocess.run(
@@ -234,10 +231,10 @@ def test_the_hash_of_a_study_does_not_depend_on_when_it_was_approved(lab: Lab) -
     first = read_lock(lab.protocol)
     lock_path(lab.protocol).unlink()
     grant = Grant("Another board", "X", TODAY + timedelta(5), lab.folder / "consent_v2.txt")
-    second = approve(lab.study, discover(), grant, TODAY)
+    second = approve(lab.study, lab.registry, grant, TODAY)
     assert second.materials_sha256 == first.materials_sha256
     assert second.seal != first.seal
-    assert verify(lab.study, discover(), TODAY).seal == second.seal
+    assert verify(lab.study, lab.registry, TODAY).seal == second.seal
 
 
 def test_another_group_in_the_protocol_is_drift(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from datetime import date, timedelta
 from pathlib import Path
 
 import pytest
-from governed import GOVERNED, GROUPED, TODAY, Lab, Willing
+from governed import GOVERNED, GROUPED, PERSON, TODAY, Lab, Willing
 from needs import needs
 
 import labcrane
@@ -283,7 +283,7 @@ def test_no_name_is_asked_for_or_kept(lab: Lab) -> None:
 def test_people_need_joysticks_and_leave_no_session_when_there_are_none(tmp_path: Path) -> None:
     from virtual_sticks import desk
 
-    lab = Lab(tmp_path, GOVERNED.replace("{use: simulated_operator}", "{use: dual_joystick}"))
+    lab = Lab(tmp_path, GOVERNED.replace(PERSON, "{use: dual_joystick}"))
     lab.approve()
     lab.consent("P001")
     from labcrane.session.session import run

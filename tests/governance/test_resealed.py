@@ -15,7 +15,6 @@ from labcrane.approval.lock import Lock, lock_path, read_lock
 from labcrane.approval.materials import content
 from labcrane.cli.app import main
 from labcrane.cli.consent import missing_consent
-from labcrane.registry.registry import discover
 from labcrane.session.eligibility import check_eligibility
 
 OTHER = "I take part, and cannot stop.\n"
@@ -51,7 +50,7 @@ def swapped(lab: Lab) -> None:
     text = lab.folder / "consent_v2.txt"
     text.write_text(OTHER, encoding="utf-8")
     resealed(lab, lambda lock: lock["materials"]["consent"].update({text.name: content(text)}))
-    verify(lab.study, discover(), TODAY)  # by itself it is as good as the approved one
+    verify(lab.study, lab.registry, TODAY)  # by itself it is as good as the approved one
 
 
 @pytest.mark.slow
@@ -79,7 +78,7 @@ def test_a_swapped_consent_text_is_noticed_wherever_somebody_is_to_take_part(
 def test_amendments_are_followed_back_to_the_lock_under_which_people_took_part(lab: Lab) -> None:
     for number, text in enumerate((OTHER, f"{OTHER}Really.\n")):
         (lab.folder / "consent_v2.txt").write_text(text, encoding="utf-8")
-        amend(lab.study, discover(), lab.grant(), f"change {number}", TODAY)
+        amend(lab.study, lab.registry, lab.grant(), f"change {number}", TODAY)
         lab.consent("P002")
         check_eligibility(lab.visit("P002"))
     # ... and a swap is found behind them as well.
@@ -128,5 +127,5 @@ def test_a_lock_that_labcrane_would_not_write_is_refused_however_it_is_sealed(
     change, why = case
     resealed(lab, change)
     with pytest.raises(ProtocolError, match="was edited by hand or is damaged") as told:
-        verify(lab.study, discover(), TODAY)
+        verify(lab.study, lab.registry, TODAY)
     assert why in str(told.value)

@@ -11,12 +11,32 @@ from labcrane.approval.lock import Lock
 from labcrane.participants.enrolment import confirm_consent
 from labcrane.participants.folders import Places
 from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import discover
+from labcrane.registry.registry import Registry, discover
 from labcrane.session.session import Visit, run
 
 TODAY = date.today()
-PERSON = "{use: simulated_operator}"
-"""The simulated operator in the place of the joysticks: to labcrane, a person like any other."""
+PERSON = "{use: stand_in}"
+"""The simulated operator as controls that a person moves, by a plugin of the study."""
+
+STAND_IN = """\
+from labcrane import hookimpl, offer
+from labcrane_operator.operator import SimulatedOperator
+from labcrane_operator.settings import OperatorSettings
+
+labcrane_api = 1
+
+
+class StandInSettings(OperatorSettings):
+    person = True
+
+
+@hookimpl
+def labcrane_inputs():
+    def build(settings, machine):
+        return SimulatedOperator(settings)
+
+    return [offer("stand_in", StandInSettings, build)]
+"""
 
 GOVERNED = SHORT.replace("{use: dual_joystick}", PERSON).replace(
     "distances: [2], movements: 2", "distances: [2], movements: 1"
@@ -26,6 +46,12 @@ GROUPED = GOVERNED.replace(
     "feedback: {sphere: {use: sphere}, tone: {use: sonification}}\n"
     "design:\n  groups: {none: [], visual: [sphere], sound: [tone]}\nsessions:",
 )
+
+
+def put_stand_in(folder: Path) -> None:
+    """Write the plugin into the folder of a study."""
+    (folder / "plugins").mkdir(exist_ok=True)
+    (folder / "plugins" / "person.py").write_text(STAND_IN, encoding="utf-8")
 
 
 @dataclass
@@ -38,6 +64,7 @@ class Lab:
     def __post_init__(self) -> None:
         self.protocol = self.folder / "study.yaml"
         self.protocol.write_text(self.text, encoding="utf-8")
+        put_stand_in(self.folder)
         (self.folder / "consent_v2.txt").write_text(
             "I take part.\nI can stop at any time.\n", encoding="utf-8"
         )
@@ -45,10 +72,14 @@ class Lab:
 
     @property
     def study(self) -> Study:
-        return load(self.protocol, discover())
+        return load(self.protocol, self.registry)
+
+    @property
+    def registry(self) -> Registry:
+        return discover(study=self.protocol)
 
     def approve(self) -> Lock:
-        return approve(self.study, discover(), self.grant(), TODAY)
+        return approve(self.study, self.registry, self.grant(), TODAY)
 
     def grant(self) -> Grant:
         last = TODAY.replace(year=TODAY.year + 1, day=1)

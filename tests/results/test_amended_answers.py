@@ -12,7 +12,6 @@ from scipy.io import loadmat
 
 from labcrane.approval.decision import amend
 from labcrane.cli.app import main
-from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
 from labcrane.session.session import run
 from results.consumers import bids_errors, needs_octave, octave, r
@@ -97,7 +96,7 @@ def exports(tmp_path_factory: pytest.TempPathFactory) -> Path:
         if name == "P002":
             edit(lab.protocol, SCALE, CHOICE)
             edit(lab.protocol, *ORDER)
-            amend(lab.study, discover(), lab.grant(), "words are easier", TODAY)
+            amend(lab.study, lab.registry, lab.grant(), "words are easier", TODAY)
         lab.consent(name)
         run(lab.visit(name, fast=True), Answering(felt))
     for to in ("tables", "psychds", "matlab", "bids"):
