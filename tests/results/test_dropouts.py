@@ -65,9 +65,11 @@ def test_means_and_n_beside_a_test_are_of_those_who_were_tested(
     for name, column in columns.items():
         means, numbers = told[name]
         assert numbers[3:] == [len(stays), people], name
-        by = list(dict.fromkeys(["participant", "phase", column]))
+        by = list(dict.fromkeys(["participant", "group", "phase", column]))
         cells = own.groupby(by)["movement_time"].mean()
-        wanted = cells.groupby(["participant", column]).mean().groupby(column).mean()
+        each = cells.groupby(list(dict.fromkeys(["participant", "group", column]))).mean()
+        in_groups = each.groupby(list(dict.fromkeys(["group", column]))).mean()
+        wanted = in_groups.groupby(column).mean()  # F is of groups of equal weight
         assert len(means) == len(wanted)
         for (level, mean), value in zip(means.items(), wanted, strict=True):
             assert mean == pytest.approx(value, rel=6e-3), (name, level)
@@ -84,7 +86,8 @@ for (last in c("", "distance", "far_side")) {
   gg <- anova(fit, es = "pes", correction = "GG")
   for (effect in if (nzchar(last)) last else c("group", "phase"))
     say(effect, gg[effect, "num Df"], gg[effect, "den Df"], gg[effect, "F"],
-        length(unique(fit$data$long$participant)))
+        length(unique(fit$data$long$participant)),
+        suppressMessages(as.data.frame(emmeans::emmeans(fit, effect))$emmean))
 }
 """
 
@@ -103,9 +106,37 @@ def test_what_is_printed_is_what_afex_says_of_the_same_rows(
     theirs = table(r(AFEX, tmp_path / "rows.csv"))
     assert set(theirs) == {"group", "phase", "distance", "far_side"}
     for effect, values in theirs.items():
-        _, numbers = told["session" if effect == "phase" else effect]
+        means, numbers = told["session" if effect == "phase" else effect]
         np.testing.assert_allclose(numbers[:3], np.array(values[:3], float), atol=0.0051)
         assert numbers[3] == float(values[3]) == len(stays)
+        # R sorts distances as text.
+        expected = sorted(map(float, values[4:]))
+        np.testing.assert_allclose(sorted(means.values()), expected, rtol=6e-3)
+
+
+@needs_r
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_means_of_groups_of_unequal_size_and_unlike_changes_are_those_of_emmeans(
+    found: Found, tmp_path: Path, seed: int
+) -> None:
+    """A few people get much faster and many a little slower: on average of groups, faster."""
+    dice = np.random.default_rng([seed, 9])
+    movements = drawn(seed, (int(dice.integers(8, 12)), 3))
+    groups = sorted(movements["group"].unique())
+    later = movements["session"] == 2
+    for group, change in zip(groups, (1.12, 0.5), strict=True):
+        movements.loc[later & (movements["group"] == group), "movement_time"] *= change
+    results, _ = found(movements)
+    (said,) = _effects(movements, results)
+    means, _ = printed(said)["session"]
+    with_factors(movements).to_csv(tmp_path / "rows.csv", index=False)
+    theirs = [float(value) for value in table(r(AFEX, tmp_path / "rows.csv"))["phase"][4:]]
+    np.testing.assert_allclose(list(means.values()), theirs, rtol=6e-3)
+    first, second = means.values()
+    contrast = re.search(r"acquisition minus 2 retention: (\N{MINUS SIGN}?)", in_words(results))
+    assert contrast is not None
+    assert (first < second) == bool(contrast[1]), "the answer and the contrast agree"
 
 
 def test_who_is_missing_is_named_with_why_and_in_every_table(

@@ -8,7 +8,11 @@ import pytest
 from scipy.stats import f_oneway
 
 from labcrane.analysis.report.answer import _effects
-from labcrane.analysis.report.findings import Results
+from labcrane.analysis.report.factors import factors_of, with_factors
+from labcrane.analysis.report.findings import Results, of_outcomes
+from labcrane.analysis.report.outcomes import StudyMovements
+from labcrane.analysis.report.words import depends
+from labcrane.analysis.statistics.anova import Anova
 from labcrane.analysis.statistics.mixed import mixed_model
 from results.test_shortfalls import drawn, found, in_words
 
@@ -59,3 +63,35 @@ def test_the_mixed_model_is_of_people_who_are_not_alone_in_a_group() -> None:
     dice = np.random.default_rng(1)
     plain = table.assign(group="", y=dice.normal(size=len(table)))
     assert mixed_model(plain, "y").participants == 12
+
+
+def test_a_planned_group_without_people_is_named_and_its_question_is_not_tested() -> None:
+    """Nobody of it was recorded yet, or all of its movements failed."""
+    there = "control"
+    movements = drawn(3, (6,)).assign(group=there)
+    whole = with_factors(movements)
+    for factors in (
+        factors_of(whole, planned_groups=(there, "sphere")),
+        factors_of(whole, dict.fromkeys(movements["participant"], there) | {"Z1": "sphere"}),
+    ):
+        assert factors.groups == tuple(sorted((there, "sphere")))
+        study = StudyMovements(whole, whole, factors, ("movement_time",))
+        lacks = {one.effect: one.short[0].why for one in of_outcomes(study) if one.test is None}
+        assert {"group", "group:session"} <= set(lacks)
+        assert lacks["group"] == lacks["group:session"]
+        assert lacks["group"].endswith(f"are in group {there}")
+
+
+def test_by_chance_no_effect_depends_on_what_the_answer_does_not_show() -> None:
+    """Of cohorts without effects some interaction of many is always found."""
+    found = 0
+    for seed in range(12):
+        whole = with_factors(drawn(seed, (8, 8)))
+        factors = factors_of(whole)
+        study = StudyMovements(whole, whole, factors, ("movement_time",))
+        tests = [one.test for one in of_outcomes(study) if isinstance(one.test, Anova)]
+        asked = {"group:session"}
+        low = {test.factor for test in tests if ":" in test.factor and test.p_gg < 0.05}
+        found += bool(low - asked)
+        assert bool(depends(tests, factors)) == bool(low & asked)
+    assert found, "such interactions were drawn"

@@ -184,8 +184,8 @@ def test_a_level_that_nobody_reached_is_named_and_one_that_is_left_is_no_factor(
     results, _ = found(given_up(table, table["far_side"] == "right"))
     said = in_words(results)
     assert (
-        "Not tested over far_side, distance and far_side: no participant has a value at far_side "
-        "right." in said
+        "Not tested over far_side, the interaction of distance and far_side: no participant has a "
+        "value at far_side right." in said
     )
 
 

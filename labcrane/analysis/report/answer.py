@@ -28,7 +28,7 @@ from labcrane.analysis.report.words import (
     shortfalls,
     verdict,
 )
-from labcrane.analysis.statistics.anova import Anova, Contrast
+from labcrane.analysis.statistics.anova import Anova, Contrast, marginal_means
 from labcrane.analysis.statistics.trends import Trend
 
 if TYPE_CHECKING:
@@ -76,8 +76,10 @@ def _design(cohort: Cohort, everything: "pd.DataFrame", results: Results | None)
         return f"{said}. No tests were made."
     factors = results.factors
     within = [name for name, _, _ in _columns(factors) if name != GROUP]
+    absent = [name for name in factors.groups if name not in set(everything[GROUP])]
+    empty = f"; {' and '.join(absent)} without movements" if absent else ""
     between = (
-        f"Between participants: {len(factors.groups)} groups ({', '.join(factors.groups)})."
+        f"Between participants: {len(factors.groups)} groups ({', '.join(factors.groups)}{empty})."
         if factors.groups
         else "There are no groups."
     )
@@ -133,9 +135,13 @@ def _effects(everything: "pd.DataFrame", results: Results | None) -> list[str]:
         if measure not in counted or measure.startswith(tuple(LOOKED)):
             continue  # a questionnaire's, or of gaze
         own = [one for one in results.findings if one.measure == measure]
-        others = depends(test for test in results.tests("anova") if test.measure == measure)
+        others = depends(
+            [test for test in results.tests("anova") if test.measure == measure], results.factors
+        )
         said = [
-            _effect(one, one.test, counted, unit, results) + others.get(one.effect, "")
+            f"the effect of {one.effect} cannot be distinguished from {one.test.confounded}"
+            if one.test.confounded
+            else _effect(one, one.test, counted, unit, results) + others.get(one.effect, "")
             for columns, unit in units.items()
             for one in own
             if one.table == "anova" and one.columns == columns and isinstance(one.test, Anova)
@@ -161,34 +167,30 @@ def _effect(
 ) -> str:
     """Return ``differed over distance (2 m: 3.21 s, 6 m: 5.40 s; F(1, 35) = 90.1, p < .001)``.
 
-    The means are of those who are in the test, with equal weights of its design's cells.
+    The means are those that the test compares: of those who are in it, with equal weights of its
+    design's cells and groups.
     """
     plan, columns, measure = finding.plan, finding.columns, test.measure
-    if test.confounded:
-        return f"the effect of {test.factor} cannot be distinguished from {test.confounded}"
     said, tested = verdict(test, STYLE), f_test(test, STYLE, results.people)
     if plan.beside:  # the means are those of the plain test, before it
         return f"{said} ({tested})"
-    own = plan.of(counted[counted["participant"].isin(test.people)])
-    within = [name for name in plan.within if name not in columns]
-    cells = own.groupby([*columns, "participant", *within])[measure].mean().dropna()
-    by = list(range(len(columns)))
-    each = cells.groupby(level=[*columns, "participant"]).mean().groupby(level=by)
-    means, sizes = each.mean(), dict(each.size())
-    if columns == (PLACE,) and len(means) > 2:  # noqa: PLR2004 - the first and the last are enough
-        means = means.iloc[[0, -1]]
+    means = list(
+        marginal_means(plan.cells(counted, measure, results.factors.between), columns).items()
+    )
+    if columns == (PLACE,):  # the first and the last are enough
+        means = [means[0], means[-1]]
+    sizes = Counter(results.factors.people[who] for who in test.people)
     levels = ", ".join(
-        f"{_level(at, columns)}{unit}{f', n = {sizes[at]}' if columns == (GROUP,) else ''}: "
+        f"{_level(at, columns)}{unit}{f', n = {sizes[at[0]]}' if columns == (GROUP,) else ''}: "
         f"{results.quantity(f'{mean:.3g}', measure)}"
-        for at, mean in means.items()
+        for at, mean in means
     )
     return f"{said} ({levels}; {tested})"
 
 
-def _level(at: Any, columns: Sequence[str]) -> str:
+def _level(at: Sequence[Any], columns: Sequence[str]) -> str:
     """Return a level of a factor, or of several: ``position 3``, ``control 1 pre-test``."""
-    parts = at if isinstance(at, tuple) else (at,)
-    words = [f"{part:g}" if isinstance(part, float) else str(part) for part in parts]
+    words = [f"{part:g}" if isinstance(part, float) else str(part) for part in at]
     return " ".join([*(["position"] if columns == (PLACE,) else []), *words])
 
 

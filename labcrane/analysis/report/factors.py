@@ -1,6 +1,6 @@
 """Factors of a study as its report sees them: group, phase, place in it, distance, side."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,8 @@ class Factors:
     Attributes
     ----------
     groups
-        Of participants, two or more; otherwise empty.
+        Of participants, two or more; otherwise empty. Those that are planned, or have people,
+        even without movements.
     phases
         Sessions, or blocks where a session has several, in order.
     kind
@@ -138,16 +139,25 @@ def _names(table: "pd.DataFrame", counted: "pd.Series[bool]") -> list[str]:
     return [named[(s, b)] if is_counted else f"practice {b:g}" for s, b, is_counted in pairs]
 
 
-def factors_of(table: "pd.DataFrame", people: Mapping[str, str] | None = None) -> Factors:
+def factors_of(
+    table: "pd.DataFrame",
+    people: Mapping[str, str] | None = None,
+    planned_groups: Collection[str] = (),
+) -> Factors:
     """Return the factors of movements :func:`with_factors`.
 
     Parameters
     ----------
     people
         All participants in the sample, and their groups; by default those with movements.
+    planned_groups
+        Groups of the protocol; one may have nobody.
     """
     counted = table[table["practice"].astype(float) == 0.0]
-    groups = tuple(sorted(name for name in counted[GROUP].unique() if name))
+    if people is None:
+        first = table.drop_duplicates("participant")
+        people = dict(zip(map(str, first["participant"]), map(str, first[GROUP]), strict=True))
+    groups = tuple(sorted({*counted[GROUP].unique(), *people.values(), *planned_groups} - {""}))
     phases = tuple(sorted(counted[PHASE].unique()))
     sessions = counted["session"].nunique()
     blocks = counted[["session", "block"]].drop_duplicates().groupby("session").size().max()
@@ -161,9 +171,6 @@ def factors_of(table: "pd.DataFrame", people: Mapping[str, str] | None = None) -
     }
     targets = {name: levels for name, levels in planned.items() if len(levels) > 1}
     crossed = _crossed(counted)
-    if people is None:
-        first = table.drop_duplicates("participant")
-        people = dict(zip(map(str, first["participant"]), map(str, first[GROUP]), strict=True))
     practice = len(counted) < len(table)
     own = conditions_in(counted)
     uneven = _uneven(counted[is_result(counted)], own) if own else ""

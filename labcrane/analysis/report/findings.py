@@ -29,6 +29,7 @@ from labcrane.analysis.report.outcomes import (
     plans,
     practice_words,
     practised,
+    questions,
     row_of,
     trend_confounded,
 )
@@ -368,6 +369,7 @@ class _PlanRun:
         plan, cells = self.plan, self._cells
         finding = partial(StudyFinding, self.table, self.measure, plan=plan)
         planned = [columns for columns in plan.effects if set(columns) <= set(self._levels)]
+        asked = [columns for _, columns in questions(self.factors) if columns[1:] == plan.within]
         tests = {tuple(test.factor.split(":")): test for test in plan.tests(cells, self.measure)}
         for columns, test in tests.items():
             name, confounded = self._name(columns), ""
@@ -376,7 +378,7 @@ class _PlanRun:
             short = self._without(columns) if columns in planned else ()
             yield finding(name, replace(test, factor=name, confounded=confounded), short, columns)
         whole = len(cells.people) + len(cells.alone)
-        for columns in planned:
+        for columns in (*planned, *asked):
             if columns not in tests:
                 no_test = Shortfall("", len(self.factors.people), whole, self._why(columns))
                 yield finding(self._name(columns), None, (no_test,), columns)

@@ -1,6 +1,6 @@
 """The report of a study: one page, one page per participant, figures and tables."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
@@ -55,6 +55,7 @@ from labcrane.analysis.statistics.time_scales import QUANTITIES, TAKEN
 from labcrane.analysis.tables.annotations import annotations_of
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.analysis.unusable import Unusable
+from labcrane.files.yaml import parse_yaml
 from labcrane.recording.participant_file.writer import kept_open
 
 if TYPE_CHECKING:
@@ -125,7 +126,8 @@ def write_report(
     results, defined = None, _definitions(cohort, everything)
     if _is_aiming(everything[is_result(everything)]):
         units = dict(zip(defined["measure"], defined["unit"], strict=True))
-        results = _study(page, everything, tables.scores, groups, about, _primary(cohort), units)
+        primary, planned = _primary(cohort), _planned_groups(cohort)
+        results = _study(page, everything, tables.scores, groups, about, primary, units, planned)
     add_thresholds(page, tables.thresholds, judge)
     _drifts(page, tables.drifts)
     page.rows(
@@ -222,6 +224,13 @@ def _primary(cohort: Cohort) -> list[str]:
     return list(dict.fromkeys(str(name) for names in named for name in names))
 
 
+def _planned_groups(cohort: Cohort) -> set[str]:
+    """Return the groups of the recorded protocols; the recording of a group may still lack."""
+    texts = {str(person.context.get("protocol", "")) for person in cohort.included}
+    written = [parse_yaml(text, "the protocol", recorded=True) for text in texts if text]
+    return {str(name) for each in written for name in each.get("design", {}).get("groups", ())}
+
+
 def _title(participants: Sequence[Participant]) -> str:
     """Return the study's title, after the kind of participants."""
     title = str(participants[0].context.get("title", "labcrane"))
@@ -280,10 +289,11 @@ def _study(
     about: str,
     primary: Sequence[str],
     units: Mapping[str, str],
+    planned_groups: Collection[str] = (),
 ) -> Results:
     """Add the results for the whole cohort, and return them."""
     everything = with_factors(everything)
-    factors = factors_of(everything, groups)
+    factors = factors_of(everything, groups, planned_groups)
     scores = outcomes.with_conditions(scores, everything)
     recorded = everything[everything["practice"].astype(float) == 0.0]
     results = everything[is_result(everything)]

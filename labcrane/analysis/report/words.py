@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from labcrane.analysis.report.factors import DISTANCE, GROUP, PHASE
+from labcrane.analysis.report.factors import DISTANCE, GROUP, PHASE, Factors
 from labcrane.analysis.report.findings import Results, StudyFinding, lacking
 from labcrane.analysis.report.outcomes import questions
 from labcrane.analysis.statistics.anova import Anova, Contrast
@@ -114,7 +114,8 @@ def paragraphs(results: Results, style: Style) -> list[str]:
         own = [one for one in results.findings if one.measure == measure]
         effects = [test for test in results.tests(*tables) if test.measure == measure]
         effects.sort(key=lambda test: test.factor not in asked)
-        name, others = style.plain(NAMES.get(measure, _looked(measure))), depends(effects)
+        name = style.plain(NAMES.get(measure, _looked(measure)))
+        others = depends(effects, results.factors)
         sentences = [
             _effect(test, style, results.people) + style.plain(others.get(test.factor, ""))
             for test in effects
@@ -142,10 +143,16 @@ def shortfalls(findings: Iterable[StudyFinding], style: Style) -> list[str]:
             factors.setdefault((short.without, short.why), []).append(one.effect)
     found = []
     for (without, why), names in factors.items():
-        over = ", ".join(" and ".join(name.split(":")) for name in names)
+        over = ", ".join(map(_spoken, sorted(names, key=lambda name: ":" in name)))
         begin = f"Without {without}, tested" if without else "Not tested"
         found.append(style.plain(f"{begin} over {over}: {why}."))
     return found
+
+
+def _spoken(effect: str) -> str:
+    """Return a main effect by its factor, and an interaction as one."""
+    names = " and ".join(effect.split(":"))
+    return f"the interaction of {names}" if ":" in effect else names
 
 
 def of_people(n: int, style: Style, people: int) -> str:
@@ -214,12 +221,16 @@ def verdict(test: Anova, style: Style) -> str:
     return f"{'differed' if test.p_gg < LEVEL else 'did not detectably differ'} over {names}"
 
 
-def depends(tests: Iterable[Anova]) -> dict[str, str]:
-    """Return what to add to each main effect whose factor is in an interaction that was found."""
+def depends(tests: Iterable[Anova], factors: Factors) -> dict[str, str]:
+    """Return what to add to each main effect whose factor is in an interaction that was found.
+
+    Of the interactions that the design asks about only: among all, some would be found by chance.
+    """
+    asked = {":".join(names): names for names, _ in questions(factors)}
     others: dict[str, list[str]] = {}
     for test in tests:
-        parts = test.factor.partition(" ")[0].split(":")
-        if len(parts) > 1 and test.p_gg < LEVEL and not test.confounded:
+        if test.factor in asked and test.p_gg < LEVEL and not test.confounded:
+            parts = asked[test.factor]
             for part in parts:
                 others.setdefault(part, []).extend(other for other in parts if other != part)
     return {
@@ -270,6 +281,7 @@ def _scale(row: Mapping[str, Any], style: Style, results: Results) -> str:
     if row["why"]:
         return f"{said}: not tested, {row['why']}."
     said += _confounded(row["confounded"])
+    said += ", averaged over people" if results.factors.groups else ""
     said += f", with {row['adjustment']}:" if row["adjustment"] else ":"
     tested = (
         f"{_t(row['t'], row['df'], row['p'], style)}{of_people(row['n'], style, results.people)}"

@@ -439,6 +439,25 @@ def compare(
     return found
 
 
+def marginal_means(cells: FactorialDesign, columns: Sequence[str]) -> dict[tuple[Any, ...], float]:
+    """Return the mean at each level of an effect: what its test compares.
+
+    Every other cell, of groups too, is weighted alike, however many people are in it.
+    """
+    weights = np.linalg.pinv(cells.model) @ cells.values
+    levels = [(cells.within.get(name) or cells.between[name]) for name in columns]
+    found = {}
+    for at in product(*levels):
+        chosen = dict(zip(columns, at, strict=True))
+        asked = np.zeros(cells.model.shape[1])
+        for term, own in cells.terms.items():
+            if set(term) <= set(chosen):
+                coded = [_coded(np.array([chosen[name]]), cells.between[name])[0] for name in term]
+                asked[own] = [np.prod(each) for each in product(*coded)]
+        found[at] = float(asked @ weights @ _mean(cells, chosen))
+    return found
+
+
 def word(level: Any) -> str:
     """Return a level's name in contrasts."""
     return "" if level is None else f"{level:g}" if isinstance(level, float) else str(level)
