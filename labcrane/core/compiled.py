@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import FunctionType
 from typing import Any, TypeVar
 
 from labcrane.files.lock import exclusive
@@ -58,6 +59,22 @@ def signatures() -> Signatures:
 def part(function: F) -> F:
     """Compile a function that others in the same module call."""
     return compile_function(function)
+
+
+@cache
+def also(function: F, signature: Any = None) -> F:
+    """Compile a function that Python runs as well, and those of its module that it calls.
+
+    They are compiled again when this module changes: keep what they call in it.
+    """
+    known = function.__globals__
+    calls = {name: known[name] for name in function.__code__.co_names if name in known}
+    same = {name: each for name, each in calls.items() if isinstance(each, FunctionType)}
+    inner = {name: also(each) for name, each in same.items()}
+    made: Any = FunctionType(function.__code__, known | inner, function.__name__)
+    made.__module__, made.__qualname__ = function.__module__, function.__qualname__
+    compiled: F = compile_function(made, signature)
+    return compiled
 
 
 def tick(function: F) -> F:

@@ -104,8 +104,9 @@ class EndEffectorSettings(HandlingSettings):
 
     redundancy: Literal["minimum_norm", "hold_pitch"] = "minimum_norm"
     """How the redundant joint is resolved. ``minimum_norm`` minimises the joint speeds: the tip's
-    pitch drifts, and a joint near its limit is relieved. ``hold_pitch`` keeps the tip's pitch, and
-    stops at the first limit."""
+    pitch drifts, and the others take over from a joint at its limit. ``hold_pitch`` keeps the
+    tip's pitch. Where the joints cannot move the tip as asked for, near a limit or a singularity,
+    it goes as nearly that way as they can, and slower."""
 
     damping: Annotated[float, Unit("m")] = Field(default=0.2, gt=0.0, le=1.0)
     """Largest damping of the least squares, in metres, reached at a singularity."""

@@ -1,6 +1,7 @@
 """Two schemes, and a button that changes between them."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from labcrane.core import Kernel, Places, Sphere, Value
 from labcrane_schemes.axis_map import find_axis
 from labcrane_schemes.end_effector import EndEffector
 from labcrane_schemes.joint_velocity import JointVelocity
-from labcrane_schemes.law import kernel_numbers
+from labcrane_schemes.law import BUTTON, BUTTON_SIGN, CHANGING, STEP, SWITCHES, kernel_of
 from labcrane_schemes.settings import SwitchableSettings
 from labcrane_schemes.signals import scheme_signals
 
@@ -84,21 +85,14 @@ class Switchable(Controller):
         return self._out
 
     def kernel(self) -> Kernel:
-        from labcrane_schemes.compiled import (  # noqa: PLC0415 - loads numba
-            BUTTON,
-            BUTTON_SIGN,
-            CHANGING,
-            STEP,
-            SWITCHES,
-            command,
-            hands,
-        )
-
         first, second = self._schemes
-        own = kernel_numbers(first.law, second.law)
+        made = kernel_of(first.law, second.law)
+        own = made.own
         own[SWITCHES], own[BUTTON], own[BUTTON_SIGN] = 1.0, self._index, self._sign
         own[STEP] = self._step
-        return Kernel(command, own, CHANGING, self._take_over, self._hand_back, inverse=hands)
+        return replace(
+            made, changing=CHANGING, take_over=self._take_over, hand_back=self._hand_back
+        )
 
     def _take_over(self, own: FloatArray, seen: Frame) -> bool:
         own[:3] = self._active, self._down, self._share

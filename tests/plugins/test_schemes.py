@@ -30,7 +30,7 @@ from labcrane.testing import (
 from labcrane_schemes import labcrane_controllers
 from labcrane_schemes.end_effector import EndEffector
 from labcrane_schemes.joint_velocity import JointVelocity
-from labcrane_schemes.shaping import Shaping
+from labcrane_schemes.law import block, shape, unshape
 from labcrane_schemes.switchable import Switchable
 
 
@@ -67,19 +67,23 @@ class TestSwitchable(ControllerContract):
 # --- what a stick asks for
 
 
+def shaped(dead_zone: float, expo: float) -> list[float]:
+    return block(ch8(), joint_velocity(dead_zone=dead_zone, expo=expo), ch8().speeds)
+
+
 def test_the_dead_zone_is_rescaled_from_its_edge_without_a_jump() -> None:
-    shaping = Shaping(0.05, 0.0)
-    assert shaping.shape(0.05) == shaping.shape(-0.05) == 0.0
-    assert shaping.shape(0.05 + 1e-9) == pytest.approx(1e-9 / 0.95)
-    assert shaping.shape(0.525) == pytest.approx(0.5)
-    assert shaping.shape(1.0) == 1.0
-    assert shaping.shape(-1.0) == -1.0
+    own = shaped(0.05, 0.0)
+    assert shape(own, 0, 0.05) == shape(own, 0, -0.05) == 0.0
+    assert shape(own, 0, 0.05 + 1e-9) == pytest.approx(1e-9 / 0.95)
+    assert shape(own, 0, 0.525) == pytest.approx(0.5)
+    assert shape(own, 0, 1.0) == 1.0
+    assert shape(own, 0, -1.0) == -1.0
 
 
 def test_expo_mixes_a_cube_into_the_deflection() -> None:
-    shaping = Shaping(0.0, 0.25)
+    own = shaped(0.0, 0.25)
     for x in np.linspace(-1, 1, 21):
-        assert shaping.shape(x) == pytest.approx(0.75 * x + 0.25 * x**3, abs=1e-15)
+        assert shape(own, 0, x) == pytest.approx(0.75 * x + 0.25 * x**3, abs=1e-15)
 
 
 @given(
@@ -88,10 +92,10 @@ def test_expo_mixes_a_cube_into_the_deflection() -> None:
     share=st.floats(-1.0, 1.0),
 )
 def test_unshaping_inverts_shaping(dead_zone: float, expo: float, share: float) -> None:
-    shaping = Shaping(dead_zone, expo)
-    pushed = shaping.unshape(share)
+    own = shaped(dead_zone, expo)
+    pushed = unshape(own, 0, share)
     assert abs(pushed) <= 1.0
-    assert shaping.shape(pushed) == pytest.approx(share, abs=1e-12)
+    assert shape(own, 0, pushed) == pytest.approx(share, abs=1e-12)
 
 
 def test_full_deflection_is_a_fraction_of_the_joint_speed_with_the_sign_of_the_map() -> None:
