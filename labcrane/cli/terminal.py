@@ -34,6 +34,8 @@ KEYS: Mapping[str, Order] = {
     "h": Order.HINT,
     "f": Order.SETTING,
     "t": Order.TAKE,
+    "v": Order.AGAIN,
+    "g": Order.WITHOUT,
 }
 PEOPLES = (*KEYS.values(), Order.ANSWER, Order.SUBMIT)
 """The actions of the experimenter."""
@@ -44,6 +46,8 @@ PROMPTS: Mapping[Order, str] = {
     Order.COMPLETION: "completed? 1 or 0: ",
     Order.SETTING: "setting, such as tone.far=3: ",
     Order.TAKE: "take which stream, such as eeg or eeg=amplifier-1: ",
+    Order.AGAIN: "start which view or sound again: ",
+    Order.WITHOUT: "go on without which view or sound: ",
 }
 """Prompts of actions that need words."""
 
@@ -56,7 +60,8 @@ PATIENCE_S = 2.0
 
 HELP = (
     "space start/continue · p pause · r repeat · s skip · e end · n note · o override · "
-    "c completion · h hint · f feedback setting · t take a stream · q fill in the questionnaire"
+    "c completion · h hint · f feedback setting · t take a stream · v start a view again · "
+    "g go on without a view · q fill in the questionnaire"
 )
 
 

@@ -202,6 +202,10 @@ _ROWS = (
     _E("order.take", 108, "the experimenter chooses a stream", _CONTROL),
     _E("loop.stalled", 109, "the session stalled: it had no tick for a while, and missed some",
        _CONTROL, "the session stalled for {seconds} s; the machine was held", "faults", "bad"),
+    _E("order.again", 110, "the experimenter starts a view or sound again",
+       _CONTROL, "{text} is started again", "actions"),
+    _E("order.without", 111, "the experimenter goes on without a view or sound",
+       _CONTROL, "the session goes on without {text}", "actions"),
     # Not markers: recorded beside the frames, or told to people alone.
     _E("session.standing", None, "how many trials were completed before",
        _STRUCTURE, "{done} trials were completed earlier"),

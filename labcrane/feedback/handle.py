@@ -10,11 +10,12 @@ from labcrane.session.commands import FeedbackLost, FeedbackReady
 
 MODULE = "labcrane.feedback.process"
 
-READY_S = 60.0
-"""How long a feedback process may take until it is ready: windows and sound servers are slow."""
+START_S = 60.0
+"""How long a feedback process may be silent until it presents: windows, sound servers and a first
+picture take their time, most of all on a busy computer."""
 
 SILENT_S = 3.0
-"""A process that has not reported for so long hangs, and is killed."""
+"""A process that presents and has not reported for so long hangs, and is killed."""
 
 STOP_S = 5.0
 """How long it may take to stop when told to."""
@@ -29,7 +30,9 @@ class FeedbackHandle:
     Attributes
     ----------
     given_up
-        Whether it has been left out.
+        Whether it is left out: it is started no more, unless :meth:`again` asks for it.
+    ready
+        Whether it could present: its windows and devices are open.
     facts
         Facts that it reports once it is ready: renderer, device, delay.
     presented
@@ -43,14 +46,14 @@ class FeedbackHandle:
     ) -> None:
         self._order = order
         self.given_up = False
-        attempts = 1 if policy == "continue" else ATTEMPTS
-        patience = Patience(READY_S, SILENT_S, STOP_S, restarts=attempts - 1)
+        self._attempts = 1 if policy == "continue" else ATTEMPTS
+        patience = Patience(START_S, SILENT_S, STOP_S, restarts=self._attempts - 1)
         self._process = ProcessHandle(MODULE, f"feedback {order.name}", patience, self._take)
         self._begin_anew()
         self._process.start(order.as_json())
 
     def _begin_anew(self) -> None:
-        self._presents = False
+        self.ready = False
         self._told = False
         self._failed: str | None = None
         self.facts = ""
@@ -61,11 +64,6 @@ class FeedbackHandle:
     def name(self) -> str:
         """The protocol's name for it."""
         return self._order.name
-
-    @property
-    def ready(self) -> bool:
-        """Whether it could present: its windows and devices are open."""
-        return self._process.ready
 
     @property
     def failure(self) -> str | None:
@@ -84,11 +82,19 @@ class FeedbackHandle:
             return []
         if (why := self.failure) is not None:
             return self._replace(why)
-        if self._presents and not self._told:
+        if self._process.ready and not self._told:
             self._told = True
             self._process.worked()
             return [FeedbackReady(self.name, self.facts)]
         return []
+
+    def again(self) -> None:
+        """Start it again after it was left out; nothing while it is not."""
+        if self.given_up:
+            self.given_up = False
+            self._process.worked()  # the count of attempts begins again
+            self._begin_anew()
+            self._process.restart(self._order.as_json())
 
     def stop(self) -> None:
         """Let it close its windows and devices."""
@@ -98,10 +104,9 @@ class FeedbackHandle:
         self._process.kill()
         why = self._failed or why  # its last reports
         self._begin_anew()
-        if not self._process.restart(self._order.as_json()):
-            self.given_up = True
-            return [FeedbackLost(self.name, f"{why}; it is left out", left_out=True)]
-        return [FeedbackLost(self.name, why)]
+        self.given_up = not self._process.restart(self._order.as_json())
+        attempt = 0 if self.given_up else self._process.fruitless + 1
+        return [FeedbackLost(self.name, why, self.given_up, attempt, self._attempts)]
 
     def _take(self, message: Mapping[str, Any]) -> None:
         self.presented = message.get("beat", self.presented)
@@ -109,6 +114,6 @@ class FeedbackHandle:
         self.sends = tuple(message.get("sends", self.sends))
         if message.get("ready"):
             self.facts = ", ".join(f"{name} {value}" for name, value in message["facts"].items())
-            self._process.ready = True
+            self.ready = True
         if message.get("presents"):
-            self._presents = True
+            self._process.ready = True  # from now on it is to report all the time

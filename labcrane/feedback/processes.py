@@ -63,6 +63,12 @@ class FeedbackProcesses:
         before, self._news = self._news, []
         return before + news
 
+    def again(self, name: str) -> None:
+        """Start a view or sound again that is left out; nothing for any other name."""
+        for handle in self.handles:
+            if handle.name == name:
+                handle.again()
+
     @property
     def sends(self) -> tuple[str, ...]:
         """The descriptions of all streams in which feedback reports its presentation."""

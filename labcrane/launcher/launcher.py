@@ -201,6 +201,14 @@ class Launcher:
         self._say(f"stream {what} is {which}")
         self._kept.append(StreamConfirmed(what, which, given_by(command)))
 
+    def _pass_orders(self, session: SessionHandle) -> None:
+        orders = self._orders()
+        for message in (*self._kept, *orders):
+            if isinstance(message, Command) and message.order is Order.AGAIN and self._feedback:
+                self._feedback.again(message.text.strip())  # the session refuses another name
+            session.send(message)
+        self._kept.clear()
+
     def _told_to_end(self) -> bool:
         """Whether the run is to end before it has begun; what is for the record is kept for it."""
         for command in self._orders():
@@ -229,10 +237,7 @@ class Launcher:
         while True:
             over = session.ended  # asked first: what it said before is taken below
             try:
-                orders = self._orders()
-                for message in (*self._kept, *orders):
-                    session.send(message)
-                self._kept.clear()
+                self._pass_orders(session)
                 messages = session.wait(0.0 if over else LOOK_S)
             except KeyboardInterrupt:
                 session.send(Command(Order.END))

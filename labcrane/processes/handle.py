@@ -83,8 +83,8 @@ class ProcessHandle:
         Whether the present process could begin its work; set by the code that reads its messages.
     restarts
         How often it was restarted.
-    given_up
-        Whether it is no longer restarted: it failed too often.
+    fruitless
+        How many restarts in a row have come to nothing so far, with the present one.
     """
 
     def __init__(
@@ -97,11 +97,10 @@ class ProcessHandle:
         self.name = name
         self.ready = False
         self.restarts = 0
-        self.given_up = False
         self._module = module
         self._patience = patience
         self._take = take
-        self._fruitless = 0
+        self.fruitless = 0
         self._clock = WatchClock()
         self._inbox: Inbox[Any] = Inbox()
         self._life: _Life | None = None
@@ -161,7 +160,7 @@ class ProcessHandle:
 
     def worked(self) -> None:
         """Note that the present process did its work: the count of restarts begins again."""
-        self._fruitless = 0
+        self.fruitless = 0
 
     def restart(self, order: object) -> bool:
         """End the present process and start another; False when that failed too often.
@@ -169,10 +168,9 @@ class ProcessHandle:
         Call it when :attr:`failure` says why.
         """
         self.kill()
-        if self._fruitless >= self._patience.restarts:
-            self.given_up = True
+        if self.fruitless >= self._patience.restarts:
             return False
-        self._fruitless += 1
+        self.fruitless += 1
         self.restarts += 1
         self.ready = False
         self._life = self._begun(order)

@@ -25,12 +25,15 @@ from labcrane.session.commands import (
 from labcrane.session.questionnaire import SIMULATION
 from labcrane.types import FloatArray
 
+LATER = {"left_out", "attempt", "attempts"}
+"""What an event of an older session may lack of a lost view or sound."""
+
 REPORTS: Mapping[str, Callable[[Mapping[str, Any]], Message]] = {
     "stream.lost": lambda data: StreamLost(data["what"]),
     "stream.back": lambda data: StreamBack(data["what"]),
     "stream.confirmed": lambda data: StreamConfirmed(data["what"], data["which"], data["by"]),
     "feedback.lost": lambda data: FeedbackLost(
-        data["what"], data["why"], left_out=bool(data.get("left_out"))
+        data["what"], data["why"], **{key: data[key] for key in data.keys() & LATER}
     ),
     "feedback.ready": lambda data: FeedbackReady(data["what"], data["facts"]),
     "launcher.gone": lambda data: LauncherGone(),

@@ -39,6 +39,8 @@ class Order(StrEnum):
     DENIED = "denied"  # from a page: a request without the right to make it
     SETTING = "setting"  # change a setting of a cue or sound: tone.far=3
     TAKE = "take"  # a stream that only its type asks for: eeg, eeg=amplifier-1 or eeg=none
+    AGAIN = "again"  # start a view or sound again that is no longer started by itself: its name
+    WITHOUT = "without"  # go on while a view or sound is not back: its name
 
 
 KINDS = {
@@ -112,6 +114,14 @@ class Submission:
 
 
 @dataclass(frozen=True, slots=True)
+class AboutFailed:
+    """What to do about a view or sound that has failed."""
+
+    order: Literal[Order.AGAIN, Order.WITHOUT]
+    what: str
+
+
+@dataclass(frozen=True, slots=True)
 class ConsentGiven:
     """Consent to a version of the text."""
 
@@ -141,6 +151,7 @@ Request = (
     | SettingChange
     | AnswerGiven
     | Submission
+    | AboutFailed
     | ConsentGiven
     | Denial
     | Malformed
@@ -175,6 +186,8 @@ def read_request(command: Command) -> Request:
             return Malformed(order, f"a setting is written name.key=value, not {text!r}")
         case Order.SUBMIT:
             return Submission()
+        case Order.AGAIN | Order.WITHOUT:
+            return AboutFailed(order, text.strip())
         case Order.TAKE:
             return Malformed(order, "no stream is asked about")  # a launcher has taken it up
     return OF_WORDS[order](text) if order in OF_WORDS else Control(order)
@@ -220,15 +233,19 @@ class SignalReport:
 
 @dataclass(frozen=True, slots=True)
 class FeedbackLost:
-    """A view or sound has failed, and is left out or started again."""
+    """A view or sound has failed: start ``attempt`` of ``attempts`` follows, or it is left out."""
 
     what: str
     why: str
     left_out: bool = False
+    attempt: int = 0
+    attempts: int = 0
     kind: Literal["feedback lost"] = "feedback lost"
 
     def __str__(self) -> str:
-        return f"{self.what} failed: {self.why}"
+        then = f"start {self.attempt} of {self.attempts} follows" if self.attempt else ""
+        then = "it is left out" if self.left_out else then
+        return f"{self.what} failed: {self.why}" + (f"; {then}" if then else "")
 
 
 @dataclass(frozen=True, slots=True)

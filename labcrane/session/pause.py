@@ -52,6 +52,7 @@ class Suspenders:
         self.by: set[str] = set()
         self.ending: list[str] = []
         self.awaited = set(awaits)
+        self._without: set[str] = set()  # views and sounds that are not waited for until back
         for name in sorted(self.awaited):
             note("feedback.awaited", {"what": name})
 
@@ -100,6 +101,7 @@ class Suspenders:
             case FeedbackReady(what, facts):
                 self._note("feedback.ready", {"what": what, "facts": facts})
                 self.awaited.discard(what)
+                self._without.discard(what)
                 self.release(f"feedback {what}")
             case FeedbackLost():
                 self._feedback_lost(report)
@@ -107,11 +109,21 @@ class Suspenders:
                 self._note("launcher.gone", {})
                 self.ending.append("labcrane run was closed or killed")
 
+    def go_on_without(self, what: str) -> None:
+        """Hold the session no longer for a view or sound that has failed, until it is back."""
+        self.awaited.discard(what)
+        self._without.add(what)
+        self.release(f"feedback {what}")
+
     def _feedback_lost(self, lost: FeedbackLost) -> None:
         who = f"feedback {lost.what}"
-        about: dict[str, Value] = {"what": lost.what, "why": lost.why, "left_out": lost.left_out}
+        about: dict[str, Value] = {
+            "what": lost.what, "why": lost.why, "left_out": lost.left_out,
+            "attempt": lost.attempt, "attempts": lost.attempts,
+        }  # fmt: skip
         self._note("feedback.lost", about)
         if lost.left_out:
             self.awaited.discard(lost.what)
-        if self._on_fault.feedback_lost == "pause" and who not in self.by:
+        holds = self._on_fault.feedback_lost == "pause" and lost.what not in self._without
+        if holds and who not in self.by:
             self.hold(who)

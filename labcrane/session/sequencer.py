@@ -16,6 +16,7 @@ from labcrane.participants.personal_data import personal
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.session.commands import (
+    AboutFailed,
     AnswerGiven,
     Command,
     Completion,
@@ -429,9 +430,10 @@ class Sequencer:
                     self._attempt.lift_limits()
             case Control(order):
                 self._wishes.add(order)
-            case Completion(completed):
-                if self._attempt is not None:
-                    self._attempt.completion = completed
+            case Completion(completed) if self._attempt is not None:
+                self._attempt.completion = completed
+            case AboutFailed(Order.WITHOUT, what):
+                self._held.go_on_without(what)
             case SettingChange():
                 self._note("feedback.setting", **self._settings.change(request))
             case _:
@@ -449,6 +451,8 @@ class Sequencer:
             case Sighting(what):
                 doubt = self._attempt.doubt(what) if self._attempt else None
                 return why_not(Order.REPORT, self._standing) or doubt
+            case AboutFailed(order, what):
+                return self._standing.why_not_about(order, what)
             case AnswerGiven() | Submission():
                 return "no questionnaire is asked"
             case ConsentGiven():

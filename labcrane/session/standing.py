@@ -80,6 +80,8 @@ class Standing:
         What is known of the trial that ended last, its number and attempt at least.
     awaited
         Views and sounds that have yet to present.
+    failed
+        Views and sounds that have failed and are not back; True for one that is left out.
     """
 
     stage: SessionStage = SessionStage.STARTING
@@ -89,6 +91,7 @@ class Standing:
     trial: Mapping[str, Any] = field(default_factory=dict)
     last: Mapping[str, Any] = field(default_factory=dict)
     awaited: frozenset[str] = frozenset()
+    failed: Mapping[str, bool] = field(default_factory=dict)
 
     @property
     def paused(self) -> bool:
@@ -132,10 +135,26 @@ class Standing:
             case "feedback.awaited":
                 return replace(begun, awaited=self.awaited | {data["what"]})
             case "feedback.ready":
-                return replace(self, awaited=self.awaited - {data["what"]})
-            case "feedback.lost" if data["left_out"]:
-                return replace(self, awaited=self.awaited - {data["what"]})
+                failed = {name: out for name, out in self.failed.items() if name != data["what"]}
+                return replace(self, awaited=self.awaited - {data["what"]}, failed=failed)
+            case "feedback.lost":
+                awaited = self.awaited - ({data["what"]} if data["left_out"] else set())
+                failed = {**self.failed, data["what"]: bool(data["left_out"])}
+                return replace(self, awaited=awaited, failed=failed)
+            case "order.again" if data["refused"] is None:
+                return replace(self, failed={**self.failed, data["text"]: False})
+            case "order.without" if data["refused"] is None:
+                return replace(self, awaited=self.awaited - {data["text"]})
         return self
+
+    def why_not_about(self, order: Order, what: str) -> str | None:
+        """Return why an order about a failed view or sound makes no sense now, or None."""
+        if what not in self.failed:
+            failed = ", ".join(sorted(self.failed)) or "none"
+            return f"{order} names a view or sound that has failed ({failed}), not {what!r}"
+        if order is Order.AGAIN and not self.failed[what]:
+            return f"{what} is being started already"
+        return None
 
 
 def why_not(order: Order, standing: Standing) -> str | None:
@@ -145,7 +164,10 @@ def why_not(order: Order, standing: Standing) -> str | None:
         return ENDED
     if stage in {SessionStage.STARTING, SessionStage.CONSENT} and order is not Order.END:
         return NOT_BEGUN
+    faults = ", ".join(sorted(standing.holds - {EXAMINER, STOP}))
     match order:
+        case Order.START if faults:
+            return f"stopped by a fault, and a movement would be held: {faults}"
         case Order.START if (
             stage not in {SessionStage.WAITING, SessionStage.JUDGEMENT} and not standing.paused
         ):

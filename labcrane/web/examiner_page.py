@@ -26,6 +26,8 @@ KEYS: tuple[tuple[str, str], ...] = (
     ("H", "write a hint to the operator"),
     ("F", "change a setting of a cue or sound"),
     ("T", "choose a stream, where a choice is needed"),
+    ("V", "start a view or sound again that has failed"),
+    ("G", "go on without a view or sound that has failed"),
     ("Q", "fill in the questionnaire"),
     ("D", "dark or light"),
     ("?", "show these keys"),

@@ -3,7 +3,7 @@
 import json
 from collections import Counter, deque
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from labcrane.core.records import Event, Value, is_done
@@ -68,6 +68,33 @@ class SessionLeft:
     advice: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Something that is lost now.
+
+    Attributes
+    ----------
+    kind, name
+        What it is, as in :data:`LOST`, and which of them.
+    why
+        What failed and why, in words.
+    since
+        When it was lost first, on the session's clock.
+    attempt, attempts
+        Which of how many starts is under way; 0 where none is.
+    accepted
+        Whether the experimenter goes on without it.
+    """
+
+    kind: str
+    name: str
+    why: str
+    since: float
+    attempt: int = 0
+    attempts: int = 0
+    accepted: bool = False
+
+
 ROUTINE = (
     "trial.", "order.", "questionnaire.", "step.", "block.", "pause.", "session.", "signal.",
     "scene.", "consent.", "stop_rule.",
@@ -105,7 +132,7 @@ class SessionView:
     rates
         The newest rates of each stream, in Hz, oldest first; None where none is known.
     faults
-        What is lost now, in words, by what it is.
+        What is lost now, by kind and name.
     settings
         Settings that were changed, by name of the cue or sound.
     rows
@@ -134,7 +161,7 @@ class SessionView:
         self.streams: Mapping[str, Any] = {}
         self.reported: list[str] = []
         self.rates: dict[str, deque[float | None]] = {}
-        self.faults: dict[tuple[str, str], str] = {}
+        self.faults: dict[tuple[str, str], Fault] = {}
         self.settings: dict[str, dict[str, Value]] = {}
         self.rows: list[Mapping[str, Value]] = []
         self.ended: SessionLeft | None = None
@@ -179,7 +206,12 @@ class SessionView:
                 )
         self._count(event)
         if kind in LOST:
-            self._fault(kind, what, event.data)
+            self._fault(kind, what, event)
+        elif event.name in {"order.again", "order.without"} and event.data["refused"] is None:
+            now = self.faults["feedback", str(event.data["text"])]
+            again = event.name == "order.again"
+            now = replace(now, attempt=int(again), accepted=now.accepted or not again)
+            self.faults[now.kind, now.name] = now
         self.version += 1
 
     def _count(self, event: Event) -> None:
@@ -198,8 +230,9 @@ class SessionView:
             kept = self.rates.setdefault(stream["label"], deque(maxlen=RATES))
             kept.append(stream.get("rate_hz"))
 
-    def _fault(self, kind: str, what: str, data: Mapping[str, Value]) -> None:
+    def _fault(self, kind: str, what: str, event: Event) -> None:
         """Note what was lost, is back, or has another value."""
+        data = event.data
         name = str(data.get("what", ""))
         key = (kind, name or str(data.get("trigger", "")))
         if (kind, what) == ("feedback", "setting"):
@@ -207,7 +240,10 @@ class SessionView:
             mine[str(data["key"])] = data["value"]
         elif what == "lost":
             why = f": {data['why']}" if data.get("why") else ""
-            self.faults[key] = f"{LOST[kind]} {name}".strip() + " failed" + why
+            said = f"{LOST[kind]} {name}".strip() + " failed" + why
+            before = self.faults.get(key, Fault(*key, said, event.time))
+            attempt, attempts = (int(str(data.get(n, 0))) for n in ("attempt", "attempts"))
+            self.faults[key] = replace(before, why=said, attempt=attempt, attempts=attempts)
         elif what in {"back", "ready"}:
             self.faults.pop(key, None)
 

@@ -169,7 +169,9 @@ def test_a_failed_process_pauses_the_session_if_the_protocol_says_so(tmp_path: P
     pausing = FED + "on_fault: {feedback_lost: pause}\n"
     seen = rehearse(a_study(tmp_path, pausing), orders)
     (lost,) = seen.events("feedback.lost")
-    assert lost.data == {"what": "tone", "why": "it hangs", "left_out": False}
+    assert lost.data == {
+        "what": "tone", "why": "it hangs", "left_out": False, "attempt": 0, "attempts": 0,
+    }  # fmt: skip
     (ready,) = seen.events("feedback.ready")
     assert ready.data == {"what": "tone", "facts": "driver jack"}
     assert [frame.paused for frame in seen.frames[48:92]].count(True) == 40

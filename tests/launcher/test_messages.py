@@ -36,7 +36,7 @@ MESSAGES = st.one_of(
     st.builds(StreamLost, WORDS),
     st.builds(StreamBack, WORDS),
     st.builds(StreamConfirmed, WORDS, WORDS, WORDS),
-    st.builds(FeedbackLost, WORDS, WORDS, st.booleans()),
+    st.builds(FeedbackLost, WORDS, WORDS, st.booleans(), st.integers(0, 9), st.integers(0, 9)),
     st.builds(FeedbackReady, WORDS, WORDS),
     st.just(LauncherGone()),
 )

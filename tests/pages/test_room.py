@@ -28,8 +28,15 @@ from labcrane.testing import ch8
 from labcrane.web import handle
 from labcrane.web.control_room import shown
 from labcrane.web.control_room.bars import groups
-from labcrane.web.control_room.buttons import answers, buttons
-from labcrane.web.control_room.condition import STATES, ExpectedSession, Lamp, lamp_of, state_of
+from labcrane.web.control_room.buttons import about_failed, answers, buttons
+from labcrane.web.control_room.condition import (
+    STATES,
+    ExpectedSession,
+    Lamp,
+    handled,
+    lamp_of,
+    state_of,
+)
 from labcrane.web.control_room.earlier import FEWEST, Earlier, read_behind
 from labcrane.web.control_room.sentences import FILTERS, sentence
 from labcrane.web.control_room.shown import ShownShapes
@@ -482,3 +489,40 @@ def test_a_browser_of_pages_that_died_is_not_waited_for_at_the_end(
 def test_times_are_minutes_and_seconds_and_hours_where_there_are_some() -> None:
     assert [clock(each) for each in (0.9, 61, 3599.9, 3661)] == ["0:00", "1:01", "59:59", "1:01:01"]
     assert clock(-0.2) == "0:00"
+
+
+def test_a_fault_is_told_with_its_time_what_is_done_and_the_buttons_that_solve_it() -> None:
+    lost = {"what": "cab", "why": "no driver", "left_out": False, "attempt": 2, "attempts": 3}
+    events = [
+        ("waiting", {"what": "aiming"}),
+        ("feedback.lost", lost),
+        ("pause.start", {"by": "feedback cab"}),
+    ]
+
+    def told() -> tuple[str, str, str, list[str]]:
+        view = after(*events)
+        lamp = lamp_of(view, Punctual(), EXPECTED)
+        (fault,) = view.faults.values()
+        assert (fault.since, fault.why) == (1.0, "cab failed: no driver"), "since it failed first"
+        solve = [button.ident for button in about_failed("cab", view)]
+        start = next(one for one in buttons(view) if one.ident == "order-start")
+        assert bool(start.why) == ("feedback cab" in view.standing.holds)
+        return lamp.level, *handled(fault, view.standing), solve
+
+    wait = "wait until it is back"
+    assert told() == ("bad", "starts it again: attempt 2 of 3", wait, ["without-cab"])
+    events.append(("feedback.lost", {**lost, "left_out": True, "attempt": 0}))
+    both = ["again-cab", "without-cab"]
+    given_up = "has given up after 3 attempts"
+    ask = "start it again, go on without it, or end the session"
+    assert told() == ("bad", given_up, ask, both)
+    events.append(("order.again", {"text": "cab", "refused": None}))
+    assert told() == ("bad", "starts it again: attempt 1 of 3", wait, ["without-cab"])
+    events.append(("feedback.lost", {**lost, "left_out": True, "attempt": 0}))
+    events.append(("order.without", {"text": "cab", "refused": None}))
+    events.append(("pause.end", {"by": "feedback cab"}))
+    later = "start it again when you can"
+    assert told() == ("warn", f"{given_up}; goes on without it", later, ["again-cab"])
+    events.append(("feedback.ready", {"what": "cab", "facts": ""}))
+    view = after(*events)
+    assert (view.faults, view.standing.failed) == ({}, {})

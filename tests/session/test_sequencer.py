@@ -201,7 +201,7 @@ def test_no_step_begins_before_all_feedback_presents_or_is_left_out(study: Study
     orders = {
         20: [FeedbackLost("tone", "it hangs")],
         40: [FeedbackReady("screen", "renderer software")],
-        60: [FeedbackLost("tone", "it hangs; it is left out", left_out=True)],
+        60: [FeedbackLost("tone", "it hangs", left_out=True)],
     }
     seen = rehearse(study, orders, awaits=("screen", "tone"))
     assert [event.data["what"] for event in seen.events("feedback.awaited")] == ["screen", "tone"]
@@ -285,3 +285,40 @@ def test_an_axis_that_the_device_does_not_have_is_refused_before_the_first_tick(
 
     with pytest.raises(ProtocolError, match=r"'-left\.z'"):
         a_study(tmp_path, SHORT.replace("left.x", "left.z"))
+
+
+PAUSING = "on_fault: {feedback_lost: pause}\n"
+GONE = FeedbackLost("tone", "it hangs", left_out=True, attempts=3)
+
+
+@pytest.mark.parametrize("back", [True, False])
+def test_a_session_held_for_a_sound_begins_nothing_and_goes_on_with_it_or_without(
+    tmp_path: Path, *, back: bool
+) -> None:
+    orders = {
+        20: [GONE],
+        40: give(Order.START),  # would begin a movement that is held
+        60: [Command(Order.AGAIN, "tone")],
+        80: [GONE],
+        90: [Command(Order.AGAIN, "bell")],
+        100: [FeedbackReady("tone")] if back else [Command(Order.WITHOUT, "tone")],
+        110: [GONE],  # gone again: waited for only where it had come back
+        111: [Command(Order.WITHOUT, "tone")],
+        120: give(Order.START),
+    }
+    seen = rehearse(a_study(tmp_path, SHORT + PAUSING), orders, waits=True)
+    refused = {name: [e.data["refused"] for e in seen.events(name)]
+               for name in ("order.start", "order.again", "order.without")}  # fmt: skip
+    assert refused == {
+        "order.start": [
+            "stopped by a fault, and a movement would be held: feedback tone",
+            None,
+        ],
+        "order.again": [
+            None,
+            "again names a view or sound that has failed (tone), not 'bell'",
+        ],
+        "order.without": [None] * (1 if back else 2),
+    }
+    assert len(seen.events("pause.start")) == len(seen.events("pause.end")) == (2 if back else 1)
+    assert len(seen.trials()) == 2

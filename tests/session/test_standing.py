@@ -84,15 +84,22 @@ class Anybody:
         self._tick += 1
         if self._tick > 600:  # enough of everything
             return [Command(Order.END)]
-        if self._draw.random() < 0.05:
+        # Faults are over sooner than they come: nothing begins during one.
+        if self._draw.random() < (0.3 if self._log.trouble else 0.02):
             self._log.trouble = None if self._log.trouble else "full"
         if self._draw.random() < 0.15:
             return [self._draw.choice(
-                [StreamLost("eeg"), StreamBack("eeg"), FeedbackReady("tone"),
+                [StreamLost("eeg"), *6 * [StreamBack("eeg"), FeedbackReady("tone")],
                  FeedbackLost("tone", "gone", left_out=self._draw.random() < 0.5)]
             )]  # fmt: skip
         if self._draw.random() < 0.5 or not self.knows():
             return []
+        if self._draw.random() < 0.1:
+            order = self._draw.choice([Order.AGAIN, Order.WITHOUT])
+            name = self._draw.choice(["tone", "nothing"])
+            why = self._view.standing.why_not_about(order, name) or ""
+            self.said.append((f"order.{order}", why))
+            return [Command(order, name)]
         button = self._draw.choice(
             [each for each in buttons(self._view) if each.order is not Order.END]
         )
@@ -169,15 +176,19 @@ def test_what_is_paused_can_be_skipped_all_the_same(running: tuple[str, dict]) -
         assert presses(view)["order-skip"] == ""
 
 
-def test_a_step_that_waits_can_be_started_while_the_controls_are_lost() -> None:
-    view = after(
+def test_nothing_is_started_that_a_fault_would_hold() -> None:
+    lost = (
         ("waiting", {"what": "aiming"}),
         ("input.lost", {"why": "pulled out"}),
         ("pause.start", {"by": "input"}),
     )
+    view = after(*lost)
     start = next(each for each in buttons(view) if each.ident == "order-start")
-    assert (start.label, start.why, start.primary) == ("Start: aiming", "", True)
+    assert (start.label, start.primary) == ("Start: aiming", False)
+    assert start.why == "stopped by a fault, and a movement would be held: input"
     assert state_of(view) == "fault"
+    view = after(*lost, ("input.back", {}), ("pause.end", {"by": "input"}))
+    assert presses(view)["order-start"] == ""
 
 
 def test_a_decision_stays_open_when_a_fault_beside_it_is_over() -> None:

@@ -57,6 +57,15 @@ def answers(stream: Mapping[str, Any]) -> list[Button]:
     return found
 
 
+def about_failed(name: str, view: SessionView) -> list[Button]:
+    """Return the buttons that solve the failure of a view or sound."""
+    found = [Button(f"again-{name}", Order.AGAIN, name, "Start it again", "V")]
+    found = [] if view.standing.why_not_about(Order.AGAIN, name) else found
+    if not view.faults["feedback", name].accepted:
+        found.append(Button(f"without-{name}", Order.WITHOUT, name, "Go on without it", "G"))
+    return found
+
+
 def buttons(view: SessionView) -> list[Button]:
     """Return all buttons; exactly one is primary unless no action is possible."""
 

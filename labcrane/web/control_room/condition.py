@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 from labcrane.analysis.presented import PresentedLimits
 from labcrane.recording.pictures import LOG
-from labcrane.session.standing import EXAMINER, STOP, SessionStage
+from labcrane.session.standing import EXAMINER, STOP, SessionStage, Standing
 from labcrane.web.live import Live
-from labcrane.web.state import SessionView
+from labcrane.web.state import Fault, SessionView
 
 SILENT_S = 1.0
 """A running session sends frames continuously; without one for so long, the page reports it."""
@@ -33,15 +33,37 @@ class Lamp:
 
 
 REMEDIES: Mapping[str, str] = {
-    "trigger": "plug the device in; its codes stay in the record, and the session continues",
-    "input": "check the controls' cable and power; the session continues when they are back",
-    "disk": "free space or reconnect the disk; no data are lost meanwhile",
-    "stream": "check the device and its program; the recorder keeps searching for it",
+    "trigger": "plug the device in",
+    "input": "check the controls' cable and power",
+    "disk": "free space or reconnect the disk",
+    "stream": "check the device and its program",
     "asked": "choose with the buttons next to it",
-    "feedback": "it is restarted automatically; end the session if it keeps failing",
     "picture": "pause; check the operator's window, the graphics driver and other programs",
 }
-"""What to do about each kind of fault."""
+"""What to do about each kind of fault, except that of a view or sound."""
+
+MEANWHILE: Mapping[str, str] = {
+    "trigger": "keeps its codes in the record and goes on",
+    "input": "holds the machine at rest, and goes on when they are back",
+    "disk": "keeps all data in memory, and goes on when it is back",
+    "stream": "keeps searching for it",
+}
+"""What labcrane does about it."""
+
+
+def handled(fault: Fault, standing: Standing) -> tuple[str, str]:
+    """Return what labcrane does about a fault, and what people can do."""
+    if fault.kind != "feedback":
+        return MEANWHILE[fault.kind], REMEDIES[fault.kind]
+    if standing.failed.get(fault.name):
+        does = f"has given up after {fault.attempts or 'all'} attempts"
+        todo = "start it again, go on without it, or end the session"
+    else:
+        of = f" of {fault.attempts}" if fault.attempts else ""
+        does, todo = f"starts it again: attempt {fault.attempt or 1}{of}", "wait until it is back"
+    if fault.accepted:
+        does, todo = f"{does}; goes on without it", "start it again when you can"
+    return does, todo
 
 
 def state_of(view: SessionView) -> str:
@@ -95,9 +117,8 @@ def lamp_of(view: SessionView, live: Live, expected: ExpectedSession, trouble: s
         return _at_the_end(view)
     if view.alarm:
         return Lamp("bad", view.alarm, "decide with the participant")
-    for (kind, _), why in view.faults.items():
-        return Lamp("bad", why, REMEDIES.get(kind, ""))
     found = [
+        *_of_faults(view),
         *_of_frames(view, live),
         *_of_pictures(view, expected),
         *_of_streams(view, expected),
@@ -117,6 +138,12 @@ def lamp_of(view: SessionView, live: Live, expected: ExpectedSession, trouble: s
         return worst or found[0]
     paused = EXAMINER in view.standing.holds
     return Lamp("ok", "paused by you; all is well" if paused else "all is well")
+
+
+def _of_faults(view: SessionView) -> Iterator[Lamp]:
+    for fault in view.faults.values():
+        does, todo = handled(fault, view.standing)
+        yield Lamp("warn" if fault.accepted else "bad", fault.why, f"{todo}; labcrane {does}")
 
 
 def _at_the_end(view: SessionView) -> Lamp:

@@ -32,6 +32,14 @@ export default {
   </header>
 
   <p v-if="s.alarm" id="alarm" role="alert" class="room-alarm">{{ s.alarm }}</p>
+  <section v-if="s.faults.length" class="room-card room-faults room-scroll" id="faults" tabindex="0" aria-label="Faults">
+    <table><thead><tr><th scope="col">Fault</th><th scope="col">For</th><th scope="col">labcrane</th><th scope="col">What to do</th></tr></thead>
+      <tbody><tr v-for="f in s.faults" :key="f.ident" :id="f.ident">
+        <td>{{ f.what }}</td><td>{{ f.lasts }}</td><td>{{ f.does }}</td>
+        <td>{{ f.todo }} <button v-for="b in [...f.buttons, ...end(f)]" :key="b.ident" type="button" class="room-button" :class="{danger: b.danger}"
+          :id="b.ident" @click="press(b)">{{ b.label }} <kbd aria-hidden="true">{{ b.key }}</kbd></button></td>
+      </tr></tbody></table>
+  </section>
   <p v-for="question in s.questions" :key="question.ident" :id="question.ident"
      class="room-question">{{ question.text }}</p>
 
@@ -306,6 +314,7 @@ export default {
     },
     sure() { this.give(this.asked.order, this.asked.text); this.$refs.sure.close(); },
     send(field) { const text = field.text.trim(); if (text) this.give(field.order, text, field); },
+    end(f) { return f.buttons.length ? this.dangerous.filter((b) => b.order === "end").map((b) => ({ ...b, ident: `end-${f.ident}` })) : []; },
     set(c, value) { this.give("setting", `${c.place}=${value}`); },
     close() { this.$emit("close"); },
     open(which) { if (!this.$refs[which].open) this.$refs[which].showModal(); },
@@ -324,6 +333,8 @@ export default {
       else if (key === "F") document.querySelector("#settings input, #settings select")?.focus();
       else if (key === "Q") document.querySelector(".room-form button, .room-form input")?.focus();
       else if (key === "T") document.querySelector("#streams button")?.focus();
+      else if (key === "V") document.querySelector("#faults [id^=again-]")?.focus();
+      else if (key === "G") document.querySelector("#faults [id^=without-]")?.focus();
       else if (key === "D") this.theme();
       else return;
       e.preventDefault();

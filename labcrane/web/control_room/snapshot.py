@@ -2,6 +2,7 @@
 
 import json
 import math
+import time
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,8 +14,14 @@ from labcrane.protocol.questions import about, questions
 from labcrane.protocol.study import Study
 from labcrane.recording.pictures import LOG
 from labcrane.web.control_room.bars import groups
-from labcrane.web.control_room.buttons import answers, buttons
-from labcrane.web.control_room.condition import ExpectedSession, lamp_of, shown_badly, state_of
+from labcrane.web.control_room.buttons import about_failed, answers, buttons
+from labcrane.web.control_room.condition import (
+    ExpectedSession,
+    handled,
+    lamp_of,
+    shown_badly,
+    state_of,
+)
 from labcrane.web.control_room.earlier import Earlier
 from labcrane.web.control_room.sentences import FILTERS, held, sentence
 from labcrane.web.control_room.sliders import sliders
@@ -91,6 +98,7 @@ class Snapshot:
             "total": len(plan.trials),
             "lamp": {"level": lamp.level, "reason": lamp.reason, "remedy": lamp.remedy},
             "alarm": session.alarm,
+            "faults": self._faults(),
             "asked": session.form is not None,
             "buttons": [button.as_json() for button in buttons(session)],
             "report": self._report(),
@@ -121,6 +129,19 @@ class Snapshot:
             "events": self._events(),
             "cameras": any(context.pictures.cameras.values()),
         }
+
+    def _faults(self) -> list[dict[str, Any]]:
+        session, found = self._context.session, []
+        for fault in () if session.over else session.faults.values():
+            does, todo = handled(fault, session.standing)
+            solve = about_failed(fault.name, session) if fault.kind == "feedback" else []
+            lasts = clock(time.perf_counter() - fault.since)
+            found.append({
+                "ident": "-".join(("fault", fault.kind, fault.name)), "what": fault.why,
+                "lasts": lasts, "does": does, "todo": todo,
+                "buttons": [button.as_json() for button in solve],
+            })  # fmt: skip
+        return found
 
     def _running(self) -> str:
         called = self._called(self._context.session.trial["trial"])
