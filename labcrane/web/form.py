@@ -67,7 +67,8 @@ class Form:
 
         session = self._context.session
         if name is None or over:
-            with ui.element("div").classes("form-calm"):
+            ended = "data-over" if over and self._page == PARTICIPANT else ""
+            with ui.element("div").classes("form-calm").props(ended):
                 if not over:
                     ui.element("span").classes("form-breath").props("aria-hidden=true")
                 said = ui.label().props('id="wait" role=status')

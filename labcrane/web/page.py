@@ -1,11 +1,13 @@
 """Page context: what every page knows, and how it asks."""
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from labcrane.design.plan import SessionPlan
 from labcrane.limits import LIMITS
+from labcrane.protocol.pages import Language
 from labcrane.protocol.study import Study
 from labcrane.session.commands import Command, Order, beyond_limits
 from labcrane.web.control_room.earlier import Earlier
@@ -25,7 +27,16 @@ def _nothing() -> None:
 
 
 DRAFTS = Path(__file__).with_name("drafts.js")
+"""Keeps unsaved text of a page when it is reloaded."""
+
 SEE_THROUGH = Path(__file__).with_name("see_through.js")
+"""Has nothing hidden on a page by what can be seen through."""
+
+STALE = Path(__file__).with_name("stale.js")
+"""Says that a page has heard nothing from its server for 2 s, and takes its buttons away."""
+
+BEAT_S = 0.5
+"""How often each page hears from its server."""
 
 PRIMARY = "#0d47a1"
 """The pages' colour for what has the focus, 8.6 to 1 on white; the usual one is too faint."""
@@ -93,25 +104,19 @@ class PageContext:
         return why
 
 
-def speak(language: str) -> None:
-    """Say in which language the page is that is being built: screen readers pronounce by it."""
+def prepare(language: Language, *scripts: Path) -> None:
+    """Prepare the page that is being built, with these scripts.
+
+    It states its language, by which screen readers pronounce, and when it is :data:`STALE`.
+    """
     from nicegui import ui  # noqa: PLC0415
 
-    ui.add_head_html(f"<script>document.documentElement.lang = {language!r}</script>")
-
-
-def keep_drafts() -> None:
-    """Keep unsaved text of the page that is being built when it is reloaded."""
-    from nicegui import ui  # noqa: PLC0415
-
-    ui.add_head_html(f"<script>{DRAFTS.read_text(encoding='utf-8')}</script>")
-
-
-def see_through() -> None:
-    """Have nothing hidden on the page that is being built by what can be seen through."""
-    from nicegui import ui  # noqa: PLC0415
-
-    ui.add_head_html(f"<script>{SEE_THROUGH.read_text(encoding='utf-8')}</script>")
+    about = f"lang = {language!r}; root.dataset.staleWords = {json.dumps(WORDS[language].stale)}"
+    ui.add_head_html(f"<script>{{const root = document.documentElement; root.{about}}}</script>")
+    ui.add_css(STALE.with_suffix(".css"))
+    for script in (STALE, *scripts):
+        ui.add_head_html(f"<script>{script.read_text(encoding='utf-8')}</script>")
+    ui.timer(BEAT_S, lambda: ui.run_javascript("labcraneBeat()"))
 
 
 def _address() -> str:

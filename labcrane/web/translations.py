@@ -57,8 +57,9 @@ class Words:
 
     Attributes
     ----------
-    wait, thanks
-        Texts while there are no questions, and after the session has ended.
+    wait, thanks, stale
+        Texts while there are no questions, after the session has ended, and while the page's server
+        does not reach it.
     progress
         A pattern with ``{done}`` and ``{total}``.
     takes
@@ -73,6 +74,7 @@ class Words:
 
     wait: str
     thanks: str
+    stale: str
     progress: str
     back: str
     on: str
@@ -145,6 +147,7 @@ SPANISH_PHRASES = Phrases(
 ENGLISH = Words(
     wait="Please wait. There are no questions right now.",
     thanks="Thank you for taking part. The session has ended. You can stop here.",
+    stale="Connection lost: what is shown is old. Please wait; it comes back by itself.",
     progress="{done} of {total} answered",
     back="Back",
     on="Next",
@@ -166,6 +169,7 @@ ENGLISH = Words(
 GERMAN = Words(
     wait="Bitte warten. Im Moment ist nichts zu beantworten.",
     thanks="Vielen Dank für Ihre Teilnahme. Die Sitzung ist zu Ende; hier ist nichts mehr zu tun.",
+    stale="Keine Verbindung: Die Anzeige ist veraltet. Bitte warten; sie kommt von selbst zurück.",
     progress="{done} von {total} beantwortet",
     back="Zurück",
     on="Weiter",
@@ -187,6 +191,7 @@ GERMAN = Words(
 POLISH = Words(
     wait="Proszę czekać. W tej chwili nie ma pytań.",
     thanks="Dziękujemy za udział. Sesja jest zakończona i nie trzeba tu już nic robić.",
+    stale="Brak połączenia: to, co widać, jest nieaktualne. Proszę czekać; wróci samo.",
     progress="odpowiedzi: {done} z {total}",
     back="Wstecz",
     on="Dalej",
@@ -208,6 +213,7 @@ POLISH = Words(
 FRENCH = Words(
     wait="Veuillez patienter. Il n’y a rien à répondre pour le moment.",
     thanks="Merci de votre participation. La séance est terminée ; il n’y a plus rien à faire ici.",
+    stale="Connexion perdue : la page n’est plus à jour. Veuillez patienter ; elle revient seule.",
     progress="{done} réponses sur {total}",
     back="Retour",
     on="Suivant",
@@ -229,6 +235,7 @@ FRENCH = Words(
 SPANISH = Words(
     wait="Espere, por favor. Ahora no hay nada que responder.",
     thanks="Gracias por participar. La sesión ha terminado y aquí ya no hay nada más que hacer.",
+    stale="Conexión perdida: lo que se ve no está al día. Espere, por favor; vuelve sola.",
     progress="{done} de {total} respondidas",
     back="Atrás",
     on="Siguiente",

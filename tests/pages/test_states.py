@@ -1,6 +1,7 @@
 """Every state of both pages in a browser: for everybody by WCAG AA, nothing cut at three sizes."""
 
 import json
+import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.by import By
 
 from labcrane.core.records import Event
+from labcrane.session.commands import Command
 from labcrane.web.control_room.condition import STATES
 from labcrane.web.handle import PageHandle, free_port
 from labcrane.web.service import PageConfig
@@ -56,12 +58,17 @@ class Told:
         self.order = PageConfig(
             protocol, "P001", "P001", 1, unique("states"), "127.0.0.1", free_port("127.0.0.1", 0)
         )
-        self._handle = PageHandle(self.order, lambda _: None, lambda _: None, dict)
+        self.given: list[Command] = []
+        self._handle = PageHandle(self.order, self.given.append, lambda _: None, dict)
         self.links = self._handle.links()
 
     def happens(self, *events: tuple[str, dict]) -> None:
         for name, data in events:
             self._handle.tell(Event(name, time.perf_counter(), data))
+
+    def signal(self, number: int) -> None:
+        """Send a signal to the pages' process."""
+        os.kill(self._handle._process.pid, number)
 
     def ends(self) -> None:
         from threading import Thread

@@ -2,6 +2,7 @@
 
 import random
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -27,6 +28,7 @@ from labcrane.errors import RecordingError
 from labcrane.machines.kinematics import link_frames
 from labcrane.registry.registry import discover
 from labcrane.web.control_room.shown import ShownShapes
+from labcrane.web.translations import WORDS
 from labcrane.web.viewer.film import POINTS, STEPS, WINDOW_SAMPLES, Film
 from labcrane.web.viewer.glances import Glances
 from labcrane.web.viewer.marks import Marks
@@ -513,7 +515,13 @@ def test_the_page_shows_the_recorded_pose_at_any_time(
             wanted = pose(film, angles, at)
             browser.execute_script(GO, at)
             wait_for(lambda wanted=wanted: apart(browser, wanted) < 1e-6)
+        viewer.send_signal(signal.SIGSTOP)
+        wait_for(lambda: WORDS["en"].stale in text(browser, "stale"))
+        check(browser, "viewer-stale")
+        viewer.send_signal(signal.SIGCONT)
+        wait_for(lambda: not text(browser, "stale"))
     finally:
+        viewer.send_signal(signal.SIGCONT)
         viewer.terminate()
         viewer.wait(240)
         viewer.stdout.close()

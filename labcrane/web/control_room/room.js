@@ -59,7 +59,7 @@ export default {
   <div class="room-reports"><slot name="reports"></slot></div>
   <p v-if="told" class="room-told" id="told" role="alert">{{ told }}</p>
 
-  <section v-if="s.report" class="room-card room-report" id="report" :class="s.report.level">
+  <section v-if="s.report" class="room-card room-report" id="report" data-over :class="s.report.level">
     <h2 id="report-verdict">{{ s.report.verdict }}</h2>
     <p v-if="s.report.remedy" id="report-remedy">{{ s.report.remedy }}</p>
     <h3>Saved</h3>

@@ -10,7 +10,7 @@ from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.registry.registry import Registry
 from labcrane.web.control_room.model import MachineModel, span
 from labcrane.web.control_room.shown import ShownShapes
-from labcrane.web.page import PRIMARY, see_through, speak
+from labcrane.web.page import PRIMARY, SEE_THROUGH, prepare
 from labcrane.web.scene import BACKGROUND, CAMERAS
 from labcrane.web.server.access import VIEWER
 from labcrane.web.server.serving import AWAY_S, build_pages, serve_here
@@ -84,8 +84,7 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
     ui.colors(primary=PRIMARY)
     ui.add_css(STYLE)
     ui.add_css(HERE / "viewer.css")
-    speak("en")
-    see_through()
+    prepare("en", SEE_THROUGH)
     screens, lacking = [], []
     for film in films:
         cues, why = film.cues(registry)
