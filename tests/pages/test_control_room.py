@@ -39,6 +39,31 @@ def keys(browser: webdriver.Chrome, *pressed: str) -> None:
     webdriver.ActionChains(browser).send_keys(*pressed).perform()
 
 
+def focused(browser: webdriver.Chrome) -> str:
+    return str(browser.switch_to.active_element.get_attribute("id"))
+
+
+def confirm(browser: webdriver.Chrome) -> None:
+    """Confirm the question that is open: its dangerous button is reached, and Enter presses it."""
+    wait_for(lambda: focused(browser) == "sure-not")
+    chain = webdriver.ActionChains(browser).key_down(Keys.SHIFT).send_keys(Keys.TAB)
+    chain.key_up(Keys.SHIFT).send_keys(Keys.ENTER).perform()
+
+
+def never_by_space(browser: webdriver.Chrome, key: str) -> None:
+    """Press Space on both buttons of the question that is open, and ask it again."""
+    asks = browser.find_element(By.ID, "sure-asks")
+    wait_for(lambda: focused(browser) == "sure-not")
+    chain = webdriver.ActionChains(browser).key_down(Keys.SHIFT).send_keys(Keys.TAB)
+    chain.key_up(Keys.SHIFT).send_keys(Keys.SPACE, Keys.SPACE).perform()
+    assert focused(browser).endswith("-sure")
+    assert asks.is_displayed(), "the dangerous button does not take Space"
+    webdriver.ActionChains(browser).send_keys(Keys.TAB, Keys.SPACE).perform()
+    wait_for(lambda: not asks.is_displayed())
+    keys(browser, key)
+    wait_for(asks.is_displayed)
+
+
 @pytest.mark.long
 def test_a_session_is_led_by_keys_alone_and_every_state_is_for_everybody(  # noqa: PLR0915 - a visit
     tmp_path: Path, browser: webdriver.Chrome
@@ -62,12 +87,13 @@ def test_a_session_is_led_by_keys_alone_and_every_state_is_for_everybody(  # noq
         keys(browser, "s")
         shown(browser, "sure-asks", "Skip this trial, break or questionnaire?")
         check(browser, "a question before skipping")
-        webdriver.ActionChains(browser).send_keys(Keys.ENTER).perform()
+        never_by_space(browser, "s")
+        confirm(browser)
         shown(browser, "now", "Break")
         check(browser, "break")
         keys(browser, "s")
         shown(browser, "sure-asks", "Skip")
-        webdriver.ActionChains(browser).send_keys(Keys.ENTER).perform()
+        confirm(browser)
         shown(browser, "stage", "ready to start: aiming")
         keys(browser, Keys.SPACE)
         shown(browser, "stage", "trial")
@@ -111,7 +137,8 @@ def test_a_session_is_led_by_keys_alone_and_every_state_is_for_everybody(  # noq
         wait_for(lambda: browser.switch_to.active_element.get_attribute("id") == "setting-ball-at")
         keys(browser, "e")
         shown(browser, "sure-asks", "End the session now?")
-        webdriver.ActionChains(browser).send_keys(Keys.ENTER).perform()
+        never_by_space(browser, "e")
+        confirm(browser)
         shown(browser, "report-verdict", "The session is saved")
         check(browser, "ended")
         press(browser, "close-page")

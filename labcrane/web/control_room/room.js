@@ -190,7 +190,7 @@ export default {
   <dialog ref="sure" class="room-dialog" aria-labelledby="sure-asks">
     <p id="sure-asks">{{ asked?.asks }}</p>
     <p><button type="button" class="room-button danger" :id="asked ? asked.ident + '-sure' : 'sure'"
-      @click="sure()">{{ asked?.label }}</button>
+      @keydown.space.prevent @keyup.space.prevent @click="sure()">{{ asked?.label }}</button>
       <button type="button" class="room-button" id="sure-not" @click="$refs.sure.close()">Cancel</button></p>
   </dialog>
   <dialog ref="keys" class="room-dialog" aria-labelledby="keys-title">
@@ -310,7 +310,7 @@ export default {
       if (!b.asks) { this.give(b.order, b.text); return; }
       this.asked = b;
       this.$nextTick(() => { if (!this.$refs.sure.open) this.$refs.sure.showModal();
-        this.$refs.sure.querySelector("button").focus(); });
+        document.getElementById("sure-not").focus(); }); // Space is pressed all day: it cancels
     },
     sure() { this.give(this.asked.order, this.asked.text); this.$refs.sure.close(); },
     send(field) { const text = field.text.trim(); if (text) this.give(field.order, text, field); },
