@@ -9,6 +9,7 @@ from typing import Any
 from labcrane.core.records import Event, Value, is_done
 from labcrane.session.standing import STOP, SessionStage, Standing
 from labcrane.web.assessment import Assessment
+from labcrane.web.control_room.sentences import INSTRUCTIONS, sentence
 
 KEPT = 500
 """Newest events that a page can show."""
@@ -125,6 +126,8 @@ class SessionView:
         Grows with every questionnaire.
     streams
         The recorder's status of the external streams.
+    instructions
+        The text that the operator reads; empty for none.
     consent
         What is asked before the session: file, version and text; nothing when none is.
     reported
@@ -166,6 +169,7 @@ class SessionView:
         self.rows: list[Mapping[str, Value]] = []
         self.ended: SessionLeft | None = None
         self.alarm = ""
+        self.instructions = ""
         self.consent: Mapping[str, Value] = {}
         self.assessment = Assessment()
 
@@ -184,8 +188,7 @@ class SessionView:
         self.events.append(event)
         self.assessment.take(event)
         self.standing = self.standing.after(event.name, event.data)
-        if event.name in SAID:
-            self.text = SAID[event.name].format(**event.data)
+        self._say(event)
         kind, _, what = event.name.partition(".")
         match kind:
             case "questionnaire":
@@ -213,6 +216,15 @@ class SessionView:
             now = replace(now, attempt=int(again), accepted=now.accepted or not again)
             self.faults[now.kind, now.name] = now
         self.version += 1
+
+    def _say(self, event: Event) -> None:
+        """State in words where the session is, and what the operator reads."""
+        if event.name == "waiting" and event.data["what"] == INSTRUCTIONS:
+            self.text = sentence(event, str).text
+        elif event.name in SAID:
+            self.text = SAID[event.name].format(**event.data)
+        if event.name in {"instructions.shown", "step.end"}:
+            self.instructions = str(event.data.get("text", ""))
 
     def _count(self, event: Event) -> None:
         """Count what happens in a trial, and note what was reported as seen."""

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from faults.sessions import unique, wait_for
 from pages.looks import check
-from pages.room import STUDY, a_room, photograph, press, shown
+from pages.room import STUDY, a_room, photograph, press, shown, text
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -74,7 +74,8 @@ def test_a_session_is_led_by_keys_alone_and_every_state_is_for_everybody(  # noq
     with a_room(protocol, tmp_path / "data") as room:
         wait_for(lambda: room.process("pages"))
         browser.get(room.links()["supervisor"])
-        shown(browser, "stage", "ready to start: instructions")
+        shown(browser, "instructions", "Please wait.")
+        shown(browser, "order-start", "They have read it: go on")
         check(browser, "waiting")
         keys(browser, "?")
         shown(browser, "keys-title", "Keys")
@@ -82,6 +83,7 @@ def test_a_session_is_led_by_keys_alone_and_every_state_is_for_everybody(  # noq
         keys(browser, Keys.ESCAPE)
         keys(browser, Keys.SPACE)
         wait_for(lambda: browser.find_elements(By.ID, "rating-8"))
+        wait_for(lambda: not text(browser, "instructions"))
         shown(browser, "now", "Questionnaire")
         check(browser, "questionnaire")
         keys(browser, "s")

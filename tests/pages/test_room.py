@@ -526,3 +526,20 @@ def test_a_fault_is_told_with_its_time_what_is_done_and_the_buttons_that_solve_i
     events.append(("feedback.ready", {"what": "cab", "facts": ""}))
     view = after(*events)
     assert (view.faults, view.standing.failed) == ({}, {})
+
+
+def test_instructions_are_on_the_page_until_the_operator_has_read_them() -> None:
+    read = [
+        ("step.start", {"step": 1, "kind": "instructions"}),
+        ("instructions.shown", {"text": "Lift the log."}),
+        ("waiting", {"what": "instructions"}),
+    ]
+    view = after(*read)
+    start = next(one for one in buttons(view) if one.ident == "order-start")
+    assert (start.label, start.primary) == ("They have read it: go on", True)
+    assert view.instructions == "Lift the log."
+    assert view.text == "The operator reads the instructions"
+    view = after(*read, ("step.end", {"step": 1}), ("waiting", {"what": "aiming"}))
+    start = next(one for one in buttons(view) if one.ident == "order-start")
+    assert (start.label, view.instructions) == ("Start: aiming", "")
+    assert view.text == "ready to start: aiming"

@@ -67,8 +67,8 @@ def test_what_stands_around_the_machine_is_drawn_where_the_session_has_it(
     with a_room(protocol, tmp_path / "data") as room:
         wait_for(lambda: room.process("pages"))
         browser.get(room.links()["supervisor"])
-        for what in ("instructions", "retrieval"):
-            shown(browser, "stage", f"ready to start: {what}")
+        for what in ("The operator reads the instructions", "ready to start: retrieval"):
+            shown(browser, "stage", what)
             press(browser, "order-start")
         shown(browser, "stage", "trial")
         (journal,) = (tmp_path / "data").rglob("ses-01_run.xdf")

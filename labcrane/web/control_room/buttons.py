@@ -6,6 +6,7 @@ from typing import Any
 
 from labcrane.session.commands import Order
 from labcrane.session.standing import ENDED, EXAMINER, STOP, SessionStage, Standing, why_not
+from labcrane.web.control_room.sentences import INSTRUCTIONS
 from labcrane.web.state import SessionView
 
 
@@ -99,4 +100,6 @@ def _start(standing: Standing) -> str:
         return "Continue anyway"
     if EXAMINER in standing.holds or standing.stage is SessionStage.JUDGEMENT:
         return "Continue"
+    if standing.what == INSTRUCTIONS:
+        return "They have read it: go on"
     return f"Start: {standing.what}" if standing.what else "Start"

@@ -56,6 +56,8 @@ export default {
     <button type="button" class="room-button quiet" id="theme" @click="theme()">
       {{ dark ? 'Light' : 'Dark' }}</button>
   </div>
+  <section v-if="s.instructions" class="room-card" aria-label="Instructions"><h2>The operator reads</h2>
+    <p class="room-lines" id="instructions">{{ s.instructions }}</p></section>
   <div class="room-reports"><slot name="reports"></slot></div>
   <p v-if="told" class="room-told" id="told" role="alert">{{ told }}</p>
 

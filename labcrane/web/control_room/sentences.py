@@ -13,6 +13,9 @@ FILTERS = ("trials", "actions", "notes", "faults", "answers", "other")
 MOST = 300
 """Characters of a sentence; the raw data has the rest."""
 
+INSTRUCTIONS = "instructions"
+"""What waits while the operator reads: its text is shown already."""
+
 Data = Mapping[str, Value]
 
 
@@ -45,6 +48,8 @@ def sentence(event: Event, called: Callable[[int], str]) -> Sentence:
 
 def _sentence(event: Event, called: Callable[[int], str]) -> Sentence:
     data = event.data
+    if event.name == "waiting" and data.get("what") == INSTRUCTIONS:
+        return Sentence("the operator reads the instructions", "other")
     said = KINDS.get(event.name)
     if said is not None and said.sentence and not data.get("refused"):
         return Sentence(said.sentence.format_map(_Told(data)), said.kind, said.level)

@@ -90,6 +90,7 @@ class Snapshot:
             ])),
             "state": state,
             "now": self._running() if state == "running" else STATES.get(state, ""),
+            "instructions": session.instructions,
             "stage": session.text + holds,
             "next": self._next(),
             "facts": " · ".join(self._facts()),
