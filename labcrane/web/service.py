@@ -16,7 +16,6 @@ from typing import Any
 from labcrane.approval.lock import read_lock
 from labcrane.core.records import Event
 from labcrane.design.plan import plan_session
-from labcrane.limits import LIMITS
 from labcrane.processes.parent import Parent
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
@@ -28,7 +27,7 @@ from labcrane.web.page import PageContext
 from labcrane.web.pictures import Pictures
 from labcrane.web.server.access import SCOPE, SUPERVISOR, AccessKeys, Gate
 from labcrane.web.server.denials import Denials
-from labcrane.web.server.serving import AWAY_S, MOST_HEAD, announcing, build_pages
+from labcrane.web.server.serving import AWAY_S, announcing, build_pages
 from labcrane.web.state import SessionLeft, SessionView
 
 FORBIDDEN, NOT_FOUND = 403, 404
@@ -127,10 +126,9 @@ def serve(order: PageConfig, parent: Parent) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher says when it is over
     if hasattr(os, "nice"):
         os.nice(NICENESS)
-    import uvicorn  # noqa: PLC0415
     from fastapi import FastAPI  # noqa: PLC0415 - loads for a second
 
-    from labcrane.web.server.guard import BoundedProtocol, Guard  # noqa: PLC0415
+    from labcrane.web.server.guard import Guard  # noqa: PLC0415
 
     study = load(order.protocol, discover(study=order.protocol), recorded=order.recorded)
     plan = plan_session(study, order.participant, order.session)
@@ -161,20 +159,14 @@ def serve(order: PageConfig, parent: Parent) -> None:
     gate = Gate(
         app, order.keys, lambda page: parent.tell(Used(page)), denials, order.port, secure=secure
     )
-    config = uvicorn.Config(
+    server = announcing(
         Guard(gate, order.host, order.port, denials, secure=secure),
-        host=order.host,
-        port=order.port,
-        log_level="error",
-        server_header=False,
-        http=BoundedProtocol,
-        h11_max_incomplete_event_size=MOST_HEAD,
-        ws_max_size=LIMITS["message of a page"].most,
-        ws_per_message_deflate=False,  # a few bytes of it can stand for megabytes
+        order.host,
+        order.port,
+        lambda: parent.tell(Served()),
         ssl_certfile=order.certificate,
         ssl_keyfile=order.key,
     )
-    server = announcing(config, lambda: parent.tell(Served()))
     threading.Thread(target=_count, args=(denials,), daemon=True).start()
     end = partial(setattr, server, "should_exit", True)  # noqa: FBT003 - the attribute's value
     threading.Thread(target=_listen, args=(parent, view, end), daemon=True).start()

@@ -24,29 +24,24 @@ MOST_MISSED = 1000
 
 def serve_here(app: Any, page: str, port: int, say: Callable[[str], None]) -> None:
     """Serve an application whose first page is ``page``; ``say`` is then told its one-time link."""
-    import uvicorn  # noqa: PLC0415 - loads for a second
-
-    from labcrane.web.server.guard import BoundedProtocol, Guard  # noqa: PLC0415
+    from labcrane.web.server.guard import Guard  # noqa: PLC0415 - loads for a second
 
     keys = AccessKeys({page: secrets.token_urlsafe(24)}, {page: secrets.token_urlsafe(24)})
     link = f"http://{HOST}:{port}/{page}?token={keys.tokens[page]}"
-    config = uvicorn.Config(
-        Guard(Gate(app, keys, lambda _: None, say, port), HOST, port, say),
-        host=HOST,
-        port=port,
-        log_level="error",
-        server_header=False,
-        http=BoundedProtocol,
-        h11_max_incomplete_event_size=MOST_HEAD,
-        ws_max_size=LIMITS["message of a page"].most,
-        ws_per_message_deflate=False,
-    )
-    announcing(config, lambda: say(f"{page}: {link}")).run()
+    guard = Guard(Gate(app, keys, lambda _: None, say, port), HOST, port, say)
+    announcing(guard, HOST, port, lambda: say(f"{page}: {link}")).run()
 
 
-def announcing(config: "uvicorn.Config", served: Callable[[], None]) -> "uvicorn.Server":
-    """Return a server that calls ``served`` as soon as pages can be opened."""
+def announcing(
+    app: Any, host: str, port: int, served: Callable[[], None], **secure: Any
+) -> "uvicorn.Server":
+    """Return a server that calls ``served`` as soon as pages can be opened.
+
+    ``secure`` is what uvicorn needs for TLS; nothing without.
+    """
     import uvicorn  # noqa: PLC0415
+
+    from labcrane.web.server.guard import BoundedProtocol  # noqa: PLC0415
 
     class Announcing(uvicorn.Server):
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -54,6 +49,18 @@ def announcing(config: "uvicorn.Config", served: Callable[[], None]) -> "uvicorn
             if self.started:
                 served()
 
+    config = uvicorn.Config(
+        app,
+        host=host,
+        port=port,
+        log_level="error",
+        server_header=False,
+        http=BoundedProtocol,
+        h11_max_incomplete_event_size=MOST_HEAD,
+        ws_max_size=LIMITS["message of a page"].most,
+        ws_per_message_deflate=False,  # a few bytes of it can stand for megabytes
+        **secure,
+    )
     return Announcing(config)
 
 

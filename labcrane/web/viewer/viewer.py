@@ -1,6 +1,5 @@
 """Viewer's page: the machine as it was recorded, with its timeline and its signals."""
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -8,13 +7,11 @@ from typing import Any
 from labcrane.errors import LabcraneError, RecordingError
 from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.registry.registry import Registry
-from labcrane.web.control_room.model import MachineModel, span
 from labcrane.web.control_room.shown import ShownShapes
 from labcrane.web.page import PRIMARY, SEE_THROUGH, prepare
-from labcrane.web.scene import BACKGROUND, CAMERAS
+from labcrane.web.scene import MachineScene, camera_buttons
 from labcrane.web.server.access import VIEWER
 from labcrane.web.server.serving import AWAY_S, build_pages, serve_here
-from labcrane.web.surroundings import Surroundings
 from labcrane.web.viewer.film import Film
 from labcrane.web.viewer.glances import Glances
 from labcrane.web.viewer.marks import Marks
@@ -32,44 +29,24 @@ class Screen:
         self._film = film
         self._shapes = shapes
 
-    def build(self) -> None:
+    def build(self) -> MachineScene:
         """Build it where the page stands."""
         from nicegui import ui  # noqa: PLC0415 - loads for a second
 
-        film, reach = self._film, span(self._film.machine)
-        with ui.element("div").props(f'role=img aria-label="{film.called}: the machine"'):
+        film = self._film
+        with ui.element("div"):
             ui.label(film.called).classes("font-medium")
-            canvas = ui.scene(grid=(round(2 * reach), 20), background_color=BACKGROUND)
-            canvas.classes("w-full")
-        x, y, z = (reach * share for share in CAMERAS["free"])
-        canvas.move_camera(x=x, y=y, z=z, look_at_z=0.2 * reach, duration=0.0)
-        self._canvas = canvas
-        self._model = MachineModel(canvas, film.machine, film.run.bodies)
-        self._around = Surroundings(canvas)
+            self._scene = MachineScene(film.machine, film.run.bodies, f"{film.called}: the machine")
         self.show(0.0)
-
-    def look(self, name: str) -> None:
-        """Look from one of the cameras."""
-        reach = span(self._film.machine)
-        x, y, z = (reach * share for share in CAMERAS[name])
-        self._canvas.move_camera(x=x, y=y, z=z, look_at_z=0.2 * reach, duration=0.3)
+        return self._scene
 
     def show(self, at: float) -> None:
         """Show a time, in seconds from the film's start."""
         at += self._film.shift
         frame, situation = self._film.frame(at), self._film.situation(at)
-        names = self._film.machine.names
-        angles = [frame.get(f"state.joint.angle.{name}", math.nan) for name in names]
-        if all(map(math.isfinite, angles)):
-            state = {
-                name.removeprefix("state."): value
-                for name, value in frame.items()
-                if name.startswith("state.")
-            }
-            self._model.place(angles, state)
         self._shapes.situate(situation)
-        self._model.show(self._shapes.shapes(frame))
-        self._around.update(situation.scene if situation.trial else "", frame)
+        things = situation.scene if situation.trial else ""
+        self._scene.show(frame, self._shapes.shapes(frame), things)
 
 
 def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
@@ -101,10 +78,6 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
             return f"second {second:g} cannot be shown: {error}"
         return ""
 
-    def look(name: str) -> None:
-        for screen in screens:
-            screen.look(name)
-
     marks, glances = Marks(first), first.glances
     about = {
         "title": " and ".join(film.called for film in films),
@@ -124,14 +97,10 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
     }
     line = Timeline(about, show, _answers(first, marks, glances))
     with line.add_slot("machine"):
-        with ui.row().classes("gap-2 mb-2").props('role=group aria-label="Cameras"'):
-            for name in CAMERAS:
-                ui.element("button").classes("room-button").props(f"type=button id=look-{name}").on(
-                    "click", lambda _, name=name: look(name)
-                ).add_slot("default", f"<span>{name}</span>")
+        scenes: list[MachineScene] = []
+        camera_buttons(scenes)
         with ui.element("div").classes("view-machines"):
-            for screen in screens:
-                screen.build()
+            scenes += [screen.build() for screen in screens]
 
 
 def _answers(film: Film, marks: Marks, glances: Glances) -> dict[str, Answer]:
