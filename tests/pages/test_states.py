@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from faults.sessions import unique, wait_for
 from pages.looks import check
-from pages.room import STUDY, shown, text
+from pages.room import STUDY, press, shown, text
 from selenium import webdriver
 from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.by import By
@@ -38,6 +38,7 @@ CONSENT = {
     "text": "I take part.\nI can stop at any time.\n" * 20,
 }  # fmt: skip
 TRIAL = {"trial": 1, "attempt": 1, "counted": True, "feedback": "ball"}
+CAB = {"what": "cab", "why": "no driver", "left_out": True, "attempt": 0, "attempts": 3}
 STOPPED = {
     "questionnaire": "load", "score": "overall", "value": 90.0, "above": 80.0,
 }  # fmt: skip
@@ -100,7 +101,7 @@ def opened(browser: webdriver.Chrome, link: str) -> None:
             browser.get(link)
         except WebDriverException:
             return False
-        return bool(browser.find_elements(By.CSS_SELECTOR, ".room, [role=main]"))
+        return bool(browser.find_elements(By.CSS_SELECTOR, ".room, .form-page"))
 
     wait_for(there)
 
@@ -115,8 +116,10 @@ BEGUN: dict[str, tuple[tuple[str, dict], ...]] = {
         ("pause.end", {"by": "examiner"}),
         ("input.lost", {"what": "left", "why": "the joystick was unplugged"}),
         ("pause.start", {"by": "input"}),
+        ("feedback.lost", CAB),
     ),
     "decision": (
+        ("feedback.ready", {"what": "cab", "facts": ""}),
         ("input.back", {"what": "left"}), ("pause.end", {"by": "input"}),
         ("stop_rule.met", STOPPED), ("pause.start", {"by": "stop rule"}),
     ),
@@ -149,6 +152,14 @@ def test_every_state_of_the_control_room_is_for_everybody(
             if state == "fault":
                 shown(browser, "lamp", "left")
                 assert text(browser, "remedy"), "what to do is said"
+                assert "has given up after 3 attempts" in text(browser, "fault-feedback-cab")
+                assert browser.find_element(By.ID, "order-start").get_attribute("title")
+                for ident, order in (("again-cab", "again"), ("without-cab", "without")):
+                    press(browser, ident)
+                    wait_for(lambda order=order: ("cab", order) in [
+                        (each.text, each.order) for each in told.given
+                    ])  # fmt: skip
+                assert browser.find_elements(By.ID, "end-fault-feedback-cab")
             if state == "consent":
                 shown(browser, "consent-version", CONSENT["version"])
             check(browser, f"supervisor-{state}")
@@ -182,6 +193,10 @@ def test_every_state_of_the_participants_page_is_for_everybody(
         refused = {"questionnaire": "person", "item": "age", "why": "not a number"}
         told.happens(("questionnaire.refused", refused))
         wait_for(lambda: text(browser, "status-age"))
+        status = browser.find_element(By.ID, "status-age")
+        assert "text-red-900" in status.get_attribute("class"), "only what is accepted is green"
+        said = WORDS["pl" if own else "en"].possible.format(takes="")
+        assert said in text(browser, "status-age"), "not in the record's words"
         check(browser, f"participant-{name}-refused")
         told.happens(("questionnaire.end", {"questionnaire": "person"}))
         load = {"questionnaire": "load", "title": "Load", "kept": json.dumps({})}

@@ -32,7 +32,7 @@ export default {
   </header>
 
   <p v-if="s.alarm" id="alarm" role="alert" class="room-alarm">{{ s.alarm }}</p>
-  <section v-if="s.faults.length" class="room-card room-faults room-scroll" id="faults" tabindex="0" aria-label="Faults">
+  <section v-if="s.faults.length" class="room-card room-faults" id="faults" aria-label="Faults">
     <table><thead><tr><th scope="col">Fault</th><th scope="col">For</th><th scope="col">labcrane</th><th scope="col">What to do</th></tr></thead>
       <tbody><tr v-for="f in s.faults" :key="f.ident" :id="f.ident">
         <td>{{ f.what }}</td><td>{{ f.lasts }}</td><td>{{ f.does }}</td>
@@ -44,13 +44,9 @@ export default {
      class="room-question">{{ question.text }}</p>
 
   <div class="room-actions" role="toolbar" aria-label="Actions" v-show="s.state !== 'ended'">
-    <button v-for="b in safe" :key="b.ident" :id="b.ident" type="button" @click="press(b)"
-      class="room-button" :class="{primary: b.primary}" :aria-disabled="b.why ? 'true' : 'false'"
-      :title="b.why || b.label">{{ b.label }} <kbd aria-hidden="true">{{ b.key }}</kbd></button>
-    <span class="room-gap"></span>
-    <button v-for="b in dangerous" :key="b.ident" :id="b.ident" type="button" @click="press(b)"
-      class="room-button danger" :aria-disabled="b.why ? 'true' : 'false'"
-      :title="b.why || b.label">{{ b.label }} <kbd aria-hidden="true">{{ b.key }}</kbd></button>
+    <button v-for="b in [...s.buttons.filter((one) => !one.danger), ...dangerous]" :key="b.ident" :id="b.ident"
+      type="button" @click="press(b)" class="room-button" :class="{primary: b.primary, danger: b.danger}"
+      :aria-disabled="b.why ? 'true' : 'false'" :title="b.why || b.label">{{ b.label }} <kbd aria-hidden="true">{{ b.key }}</kbd></button>
     <button type="button" class="room-button quiet" id="help" @click="open('keys')"
       aria-label="Keys">?</button>
     <button type="button" class="room-button quiet" id="theme" @click="theme()">
@@ -93,6 +89,7 @@ export default {
           @submit.prevent="send(field)">
           <label :for="field.order + '-field'">{{ field.label }} <kbd aria-hidden="true">{{ field.key }}</kbd></label>
           <input :id="field.order + '-field'" v-model="field.text" autocomplete="off"
+            :data-draft="s.who + ' ' + field.order" data-held=""
             :maxlength="field.most">
           <button class="room-button" :id="'order-' + field.order" type="submit">Send</button>
         </form>
@@ -215,7 +212,6 @@ export default {
   },
   computed: {
     mark() { return { ok: "✓", warn: "!", bad: "✕" }[this.s.lamp.level]; },
-    safe() { return this.s.buttons.filter((b) => !b.danger); },
     dangerous() { return this.s.buttons.filter((b) => b.danger); },
     listed() {
       const words = this.find.toLowerCase();
@@ -268,10 +264,6 @@ export default {
     },
   },
   watch: {
-    words: { deep: true, handler(now) { // kept in this tab when the page is reloaded
-      const texts = Object.fromEntries(now.map((field) => [field.order, field.text]));
-      try { sessionStorage.setItem(this.drafts(), JSON.stringify(texts)); } catch { /* keeps nothing */ }
-    } },
     "s.measures": { immediate: true, handler(now) {
       if (now.length && !now.some((m) => m.name === this.measure)) this.measure = now[0].name;
     } },
@@ -279,9 +271,6 @@ export default {
   mounted() {
     let kept = null;
     try { kept = localStorage.getItem("labcrane-theme"); } catch { /* a browser that keeps nothing */ }
-    let drafts = null;
-    try { drafts = JSON.parse(sessionStorage.getItem(this.drafts())); } catch { /* as above */ }
-    for (const field of this.words) field.text = drafts?.[field.order] ?? "";
     this.dark = kept ? kept === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
     this.paint();
     addEventListener("keydown", this.key);
@@ -292,11 +281,13 @@ export default {
     clearInterval(this.timer);
   },
   methods: {
-    drafts() { return `labcrane-draft ${this.s.who}`; },
     show(part) { Object.assign(this.s, part); },
     taken(ident, why) {
       const field = this.waiting[ident]?.field;
-      if (field && !why && field.text.trim() === this.waiting[ident].text) field.text = "";
+      if (field && !why && field.text.trim() === this.waiting[ident].text) {
+        field.text = "";
+        document.getElementById(`${field.order}-field`).dataset.held = ""; // its draft is forgotten
+      }
       delete this.waiting[ident];
       this.told = why;
     },
