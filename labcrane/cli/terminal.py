@@ -216,8 +216,8 @@ class Terminal:
                     return
                 try:
                     answer = item.check(sheet.read(item, said))
-                except AnswerError as error:
-                    self._progress.print(self._words.refused(str(error), item), markup=False)
+                except AnswerError:
+                    self._progress.print(self._words.refused(item), markup=False)
                     continue
                 self._console.give(Command(Order.ANSWER, sheet.answer(item, answer)))
                 break

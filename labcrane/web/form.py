@@ -161,9 +161,9 @@ class Form:
                 ui.button(
                     self._words.no_answer, on_click=lambda: self._answer(name, item, None)
                 ).props(f'flat no-caps color=grey-9 id="decline-{item.name}"')
-                status = ui.label().classes("text-green-900")
+                status = ui.label()
                 status.props(f'id="status-{item.name}" role=status')
-            self._refreshers.append(lambda: status.set_text(self._status(item)))
+            self._refreshers.append(lambda: self._tell(status, item))
         return card
 
     def _choices(
@@ -247,13 +247,18 @@ class Form:
         given = {"questionnaire": name, "item": item.name, "value": value}
         self._context.give(self._page, Order.ANSWER, json.dumps(given, ensure_ascii=False))
 
-    def _status(self, item: Item) -> str:
+    def _tell(self, status: "ui.label", item: Item) -> None:
+        """State what the record has of an item; only what it has accepted is green."""
         session, words = self._context.session, self._words
-        if session.refusal and session.refused_item == item.name:
-            return f"{words.not_taken}: {words.refused(session.refusal, item)}"
-        if item.name not in session.answers:
-            return ""
-        return words.declined if session.answers[item.name] is None else words.saved
+        refused = bool(session.refusal) and session.refused_item == item.name
+        status.classes(replace="text-red-900" if refused else "text-green-900")
+        if refused:
+            status.set_text(f"{words.not_taken}: {words.refused(item)}")
+        elif item.name not in session.answers:
+            status.set_text("")
+        else:
+            declined = session.answers[item.name] is None
+            status.set_text(words.declined if declined else words.saved)
 
     def _refusal(self) -> str:
         """Return why the last answer or submission was not accepted."""
@@ -263,7 +268,7 @@ class Form:
         items = {
             item.name: item for item in self._context.study.questionnaires[session.form].items()
         }
-        return self._words.refused(session.refusal, items.get(session.refused_item))
+        return self._words.refused(items.get(session.refused_item))
 
 
 def _label(item: Item, value: float) -> str:

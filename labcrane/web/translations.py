@@ -8,50 +8,6 @@ from labcrane.protocol.pages import Language
 
 
 @dataclass(frozen=True, slots=True)
-class Phrases:
-    """Phrases of one language: which answers an item takes, and why one was not accepted.
-
-    Attributes
-    ----------
-    one_of, span, stepped
-        Patterns: ``{names}``; ``{low}`` and ``{high}``; and ``{span}`` with ``{step}``.
-    text
-        What an item of words takes.
-    lacking, personal, possible
-        Messages for a questionnaire with gaps, for text with personal data, and for a value that
-        an item does not take (with ``{takes}``).
-    """
-
-    one_of: str
-    span: str
-    stepped: str
-    text: str
-    lacking: str
-    personal: str
-    possible: str
-
-    def takes(self, item: Item) -> str:
-        """Return what an item takes."""
-        if item.kind == "choice":
-            return self.one_of.format(names=", ".join(item.labels or item.choices))
-        if item.kind == "text":
-            return self.text
-        span = self.span.format(low=f"{item.lowest:g}", high=f"{item.highest:g}")
-        if item.step:
-            span = self.stepped.format(span=span, step=f"{item.step:g}")
-        return f"{span}: {item.meanings}" if item.meanings else span
-
-    def refused(self, why: str, item: Item | None) -> str:
-        """Return why an answer was not accepted; ``why`` is in the record's language, English."""
-        del why
-        if item is None:
-            return self.lacking
-        return (
-            self.personal if item.kind == "text" else self.possible.format(takes=self.takes(item))
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class Words:
     """One language.
 
@@ -62,11 +18,12 @@ class Words:
         does not reach it.
     progress
         A pattern with ``{done}`` and ``{total}``.
-    takes
-        Returns which answers an item takes.
-    refused
-        Returns why an answer, or a questionnaire without one, was not accepted; takes the refusal
-        in the record, and the item if it is about one.
+    one_of, span, stepped, text
+        Patterns of which answers an item takes: ``{names}``; ``{low}`` and ``{high}``; ``{span}``
+        with ``{step}``; and what an item of words takes.
+    lacking, personal, possible
+        Messages for a questionnaire with gaps, for text with personal data, and for a value that
+        an item does not take (with ``{takes}``).
     seen, heard
         Return the label of the button that reports something, and the text after the report has
         arrived; both take its name.
@@ -87,10 +44,34 @@ class Words:
     version: str
     take_part: str
     open_file: str
-    takes: Callable[[Item], str]
-    refused: Callable[[str, Item | None], str]
+    one_of: str
+    span: str
+    stepped: str
+    text: str
+    lacking: str
+    personal: str
+    possible: str
     seen: Callable[[str], str]
     heard: Callable[[str], str]
+
+    def takes(self, item: Item) -> str:
+        """Return what an item takes."""
+        if item.kind == "choice":
+            return self.one_of.format(names=", ".join(item.labels or item.choices))
+        if item.kind == "text":
+            return self.text
+        span = self.span.format(low=f"{item.lowest:g}", high=f"{item.highest:g}")
+        if item.step:
+            span = self.stepped.format(span=span, step=f"{item.step:g}")
+        return f"{span}: {item.meanings}" if item.meanings else span
+
+    def refused(self, item: Item | None) -> str:
+        """Return why an answer was not accepted, or a questionnaire that lacks some."""
+        if item is None:
+            return self.lacking
+        return (
+            self.personal if item.kind == "text" else self.possible.format(takes=self.takes(item))
+        )
 
 
 NAMES: Mapping[Language, Mapping[str, str]] = {
@@ -106,43 +87,6 @@ def _named(language: Language, pattern: str) -> Callable[[str], str]:
     """Return a function that fills a pattern with a thing's name in a language."""
     return lambda what: pattern.format(what=NAMES.get(language, {}).get(what, what))
 
-
-GERMAN_PHRASES = Phrases(
-    one_of="eines von {names}",
-    span="{low} bis {high}",
-    stepped="{span} in Schritten von {step}",
-    text="Worte",
-    lacking="Es fehlen noch Antworten: bitte antworten oder „Keine Angabe“ wählen",
-    personal="Bitte ohne E-Mail-Adresse und Telefonnummer schreiben",
-    possible="Möglich ist {takes}",
-)
-POLISH_PHRASES = Phrases(
-    one_of="jedna z odpowiedzi: {names}",
-    span="od {low} do {high}",
-    stepped="{span} co {step}",
-    text="tekst",
-    lacking="Brakuje jeszcze odpowiedzi: proszę odpowiedzieć albo wybrać „Bez odpowiedzi”",
-    personal="Proszę pisać bez adresu e-mail i numeru telefonu",
-    possible="Możliwa odpowiedź: {takes}",
-)
-FRENCH_PHRASES = Phrases(
-    one_of="l’une des réponses : {names}",
-    span="de {low} à {high}",
-    stepped="{span} par pas de {step}",
-    text="du texte",
-    lacking="Il manque encore des réponses : répondez ou choisissez « Sans réponse »",
-    personal="Écrivez sans adresse e-mail ni numéro de téléphone",
-    possible="Réponse possible : {takes}",
-)
-SPANISH_PHRASES = Phrases(
-    one_of="una de las respuestas: {names}",
-    span="de {low} a {high}",
-    stepped="{span} en pasos de {step}",
-    text="texto",
-    lacking="Aún faltan respuestas: responda o elija «Sin respuesta»",
-    personal="Escriba sin correo electrónico ni número de teléfono",
-    possible="Respuesta posible: {takes}",
-)
 
 ENGLISH = Words(
     wait="Please wait. There are no questions right now.",
@@ -160,8 +104,13 @@ ENGLISH = Words(
     version="version",
     take_part="I have read this text and agree to take part",
     open_file="Open",
-    takes=lambda item: item.takes,
-    refused=lambda why, item: why,
+    one_of="one of {names}",
+    span="{low} to {high}",
+    stepped="{span} in steps of {step}",
+    text="words",
+    lacking="Some answers are missing: please answer, or choose “No answer”",
+    personal="Please write without an e-mail address or a telephone number",
+    possible="Possible is {takes}",
     seen=_named("en", "I see: {what}"),
     heard=_named("en", "{what}: reported"),
 )
@@ -182,8 +131,13 @@ GERMAN = Words(
     version="Fassung",
     take_part="Ich habe diesen Text gelesen und nehme teil",
     open_file="Öffnen:",
-    takes=GERMAN_PHRASES.takes,
-    refused=GERMAN_PHRASES.refused,
+    one_of="eines von {names}",
+    span="{low} bis {high}",
+    stepped="{span} in Schritten von {step}",
+    text="Worte",
+    lacking="Es fehlen noch Antworten: bitte antworten oder „Keine Angabe“ wählen",
+    personal="Bitte ohne E-Mail-Adresse und Telefonnummer schreiben",
+    possible="Möglich ist {takes}",
     seen=_named("de", "Ich sehe: {what}"),
     heard=_named("de", "{what}: gemeldet"),
 )
@@ -204,8 +158,13 @@ POLISH = Words(
     version="wersja",
     take_part="Przeczytałam lub przeczytałem ten tekst i biorę udział",
     open_file="Otwórz:",
-    takes=POLISH_PHRASES.takes,
-    refused=POLISH_PHRASES.refused,
+    one_of="jedna z odpowiedzi: {names}",
+    span="od {low} do {high}",
+    stepped="{span} co {step}",
+    text="tekst",
+    lacking="Brakuje jeszcze odpowiedzi: proszę odpowiedzieć albo wybrać „Bez odpowiedzi”",
+    personal="Proszę pisać bez adresu e-mail i numeru telefonu",
+    possible="Możliwa odpowiedź: {takes}",
     seen=_named("pl", "Widzę: {what}"),
     heard=_named("pl", "{what}: zgłoszono"),
 )
@@ -226,8 +185,13 @@ FRENCH = Words(
     version="version",
     take_part="J’ai lu ce texte et je participe",
     open_file="Ouvrir :",
-    takes=FRENCH_PHRASES.takes,
-    refused=FRENCH_PHRASES.refused,
+    one_of="l’une des réponses : {names}",
+    span="de {low} à {high}",
+    stepped="{span} par pas de {step}",
+    text="du texte",
+    lacking="Il manque encore des réponses : répondez ou choisissez « Sans réponse »",
+    personal="Écrivez sans adresse e-mail ni numéro de téléphone",
+    possible="Réponse possible : {takes}",
     seen=_named("fr", "Je vois : {what}"),
     heard=_named("fr", "{what} : signalé"),
 )
@@ -248,8 +212,13 @@ SPANISH = Words(
     version="versión",
     take_part="He leído este texto y participo",
     open_file="Abrir:",
-    takes=SPANISH_PHRASES.takes,
-    refused=SPANISH_PHRASES.refused,
+    one_of="una de las respuestas: {names}",
+    span="de {low} a {high}",
+    stepped="{span} en pasos de {step}",
+    text="texto",
+    lacking="Aún faltan respuestas: responda o elija «Sin respuesta»",
+    personal="Escriba sin correo electrónico ni número de teléfono",
+    possible="Respuesta posible: {takes}",
     seen=_named("es", "Veo: {what}"),
     heard=_named("es", "{what}: comunicado"),
 )

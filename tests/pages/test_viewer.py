@@ -290,6 +290,16 @@ def test_the_target_and_the_cue_are_drawn_where_the_record_has_them(file: Path, 
     assert seen > 20
 
 
+def test_a_recorded_sound_is_no_cue_that_is_lacking(
+    film: Film, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorded = [("tone", "sonification", {}), ("ball", "sphere", {"at": "tip"}), ("x", "gone", {})]
+    monkeypatch.setattr(Film, "_recorded_cues", lambda _: iter(recorded))
+    cues, (why,) = film.cues(discover())
+    assert list(cues) == ["ball"]
+    assert why.startswith("cue 'x' is not shown: cue 'gone' is not installed")
+
+
 def test_a_session_without_frames_says_that_there_is_nothing_to_see(file: Path) -> None:
     record = open_recording(file).session(1)
     del record.streams["state"]

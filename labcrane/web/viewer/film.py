@@ -16,7 +16,7 @@ import numpy as np
 
 from labcrane.analysis.gaze_streams import unmeasured
 from labcrane.core.records import Event, Run, SessionState
-from labcrane.core.roles import Cue
+from labcrane.core.roles import Cue, Feedback
 from labcrane.core.settings import Settings
 from labcrane.core.signals import Layout, signals_of
 from labcrane.design.counts import TrialCounts
@@ -361,6 +361,8 @@ class Film:
         """Return what draws the recorded cues, and why some of them cannot be drawn."""
         found, lacking = {}, []
         for name, use, settings in self._recorded_cues():
+            if Feedback in registry.roles(use):
+                continue  # a sound, which no picture shows
             try:
                 offer = registry.find(Cue, use)
                 found[name] = RecordedCue(offer, offer.settings.model_validate(settings))
