@@ -77,13 +77,13 @@ def labcrane_feedback():
 '''
 
 
-def install(folder: Path) -> None:
-    """Install a plugin that raises for those who look for modules in ``folder``."""
-    (folder / "raising_plugin.py").write_text(PLUGIN)
-    about = folder / "raising_plugin-1.dist-info"
+def install(folder: Path, name: str = "raising", plugin: str = PLUGIN) -> None:
+    """Install a plugin, such as one that raises, for those who look for modules in ``folder``."""
+    (folder / f"{name}_plugin.py").write_text(plugin)
+    about = folder / f"{name}_plugin-1.dist-info"
     about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: raising-plugin\nVersion: 1\n")
-    (about / "entry_points.txt").write_text("[labcrane]\nraising = raising_plugin\n")
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}-plugin\nVersion: 1\n")
+    (about / "entry_points.txt").write_text(f"[labcrane]\n{name} = {name}_plugin\n")
 
 
 def hosts() -> list[psutil.Process]:

@@ -71,8 +71,7 @@ def labcrane_feedback():
 def test_a_view_that_was_left_out_is_started_again_and_a_slow_first_picture_does_not_kill_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    install(tmp_path)
-    (tmp_path / "raising_plugin.py").write_text(PLUGIN.replace("LONG_S", f"{SILENT_S + 1.5}"))
+    install(tmp_path, "slow", PLUGIN.replace("LONG_S", f"{SILENT_S + 1.5}"))
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     protocol, marker = tmp_path / "study.yaml", tmp_path / "broken"
