@@ -79,7 +79,7 @@ def test_a_session_is_led_and_answered_from_a_browser(  # noqa: PLR0915 - one vi
         shown(browser, "status-age", "saved")
         shown(browser, "status-sex", "saved")
         press(browser, "submit")
-        shown(browser, "refusal", "handedness, experience, gaming have no answer")
+        shown(browser, "refusal", "Some answers are missing")
         press(browser, "handedness-left")
         write(browser, "experience-field", "2.5")
         write(browser, "gaming-field", "0")
