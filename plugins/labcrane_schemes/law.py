@@ -40,8 +40,7 @@ Numbers = list[float] | FloatArray
 ) = range(15)  # fmt: skip
 """Tables, one row of numbers per joint or stick each. Those from COLUMN_R on are of one tick:
 Jacobian, speeds in rad/s, what the soft stops leave of them, bounds of the speeds, speeds that
-are wanted if those at a bound stay there, and 1 or -1 for a
-joint that is at its upper or lower bound."""
+are wanted if those at a bound stay there, and 1 or -1 for a joint at its upper or lower bound."""
 N_TABLES = 15
 NOTHING = 1e-12
 """Joint speed in rad/s that is rounding, not motion."""
@@ -256,6 +255,7 @@ def least_squares(own: Numbers, at: int, damping2: float, radial: float, vertica
                 count += 1.0
                 mean_r += own[r + j]
                 mean_z += own[z + j]
+        count = max(count, 1.0)  # all at a bound leave nothing to share
         mean_r, mean_z, turned = mean_r / count, mean_z / count, turned / count
     rr = rz = zz = 0.0
     for j in range(1, n):
