@@ -70,7 +70,7 @@ class SessionLeft:
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class OpenFault:
     """Something that is lost now.
 
     Attributes
@@ -164,7 +164,7 @@ class SessionView:
         self.streams: Mapping[str, Any] = {}
         self.reported: list[str] = []
         self.rates: dict[str, deque[float | None]] = {}
-        self.faults: dict[tuple[str, str], Fault] = {}
+        self.faults: dict[tuple[str, str], OpenFault] = {}
         self.settings: dict[str, dict[str, Value]] = {}
         self.rows: list[Mapping[str, Value]] = []
         self.ended: SessionLeft | None = None
@@ -253,7 +253,7 @@ class SessionView:
         elif what == "lost":
             why = f": {data['why']}" if data.get("why") else ""
             said = f"{LOST[kind]} {name}".strip() + " failed" + why
-            before = self.faults.get(key, Fault(*key, said, event.time))
+            before = self.faults.get(key, OpenFault(*key, said, event.time))
             attempt, attempts = (int(str(data.get(n, 0))) for n in ("attempt", "attempts"))
             self.faults[key] = replace(before, why=said, attempt=attempt, attempts=attempts)
         elif what in {"back", "ready"}:

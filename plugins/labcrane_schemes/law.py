@@ -317,7 +317,7 @@ def bounded(own: Numbers, at: int, damping2: float, radial: float, vertical: flo
         if not leaves:
             break
         own[bound + leaves] = 0.0
-    for j in range(1, n):  # rounding is no motion beyond a limit
+    for j in range(1, n):  # rounding must not pass a limit
         own[speeds + j] = min(max(own[speeds + j], own[least + j]), own[most + j])
 
 

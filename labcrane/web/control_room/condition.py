@@ -8,7 +8,7 @@ from labcrane.analysis.presented import PresentedLimits
 from labcrane.recording.pictures import LOG
 from labcrane.session.standing import EXAMINER, STOP, SessionStage, Standing
 from labcrane.web.live import Live
-from labcrane.web.state import Fault, SessionView
+from labcrane.web.state import OpenFault, SessionView
 
 SILENT_S = 1.0
 """A running session sends frames continuously; without one for so long, the page reports it."""
@@ -51,7 +51,7 @@ MEANWHILE: Mapping[str, str] = {
 """What labcrane does about it."""
 
 
-def handled(fault: Fault, standing: Standing) -> tuple[str, str]:
+def handled(fault: OpenFault, standing: Standing) -> tuple[str, str]:
     """Return what labcrane does about a fault, and what people can do."""
     if fault.kind != "feedback":
         return MEANWHILE[fault.kind], REMEDIES[fault.kind]
