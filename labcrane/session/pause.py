@@ -30,6 +30,8 @@ class Suspenders:
         Takes an event's name and data; every reason that comes or goes is one.
     awaits
         Names of the views and sounds that are still to present their first frame.
+    people
+        Whether a person operates, who would move without a view that never came.
 
     Attributes
     ----------
@@ -46,8 +48,11 @@ class Suspenders:
         on_fault: OnFault,
         note: Callable[[str, dict[str, Value]], None],
         awaits: Iterable[str] = (),
+        *,
+        people: bool = False,
     ) -> None:
         self._on_fault = on_fault
+        self._people = people
         self._note = note
         self.by: set[str] = set()
         self.ending: list[str] = []
@@ -122,8 +127,11 @@ class Suspenders:
             "attempt": lost.attempt, "attempts": lost.attempts,
         }  # fmt: skip
         self._note("feedback.lost", about)
-        if lost.left_out:
+        policy = self._on_fault.feedback_lost
+        holds = policy == "pause"
+        if lost.left_out and lost.what in self.awaited:
             self.awaited.discard(lost.what)
-        holds = self._on_fault.feedback_lost == "pause" and lost.what not in self._without
+            holds |= self._people and policy != "continue"
+        holds &= lost.what not in self._without
         if holds and who not in self.by:
             self.hold(who)

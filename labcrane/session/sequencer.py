@@ -95,7 +95,7 @@ class Sequencer:
         self._ledger = ledger or Ledger(study, plan)
         # What can still be judged may have ended before this process began.
         self._standing = Standing(SessionStage.BETWEEN, last=self._ledger.unjudged)
-        self._held = Suspenders(study.protocol.on_fault, self._say, awaits)
+        self._held = Suspenders(study.protocol.on_fault, self._say, awaits, people=waits)
         self._attempt: TrialRun | None = None
         self._step = 0
         self._questionnaire: QuestionnaireRun | None = None

@@ -9,6 +9,7 @@ from rehearsal import SHORT, a_study, rehearse
 
 from labcrane import InputDevice
 from labcrane.core.records import Frame, Phase
+from labcrane.protocol.protocol import OnFault
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Order
@@ -213,6 +214,31 @@ def test_no_step_begins_before_all_feedback_presents_or_is_left_out(study: Study
     (started,) = seen.events("step.start")
     assert started.time == pytest.approx(seen.frames[61].tick.due)
     assert [lost.data["left_out"] for lost in seen.events("feedback.lost")] == [False, True]
+    assert len(seen.trials()) == 2
+
+
+@pytest.mark.parametrize(
+    ("rule", "waits", "held"),
+    [("restart", True, True), ("pause", True, True), ("continue", True, False),
+     ("restart", False, False)],
+)  # fmt: skip
+def test_a_person_moves_nothing_before_a_view_that_never_came_is_decided_on(
+    study: Study, *, rule: str, waits: bool, held: bool
+) -> None:
+    on_fault = OnFault(feedback_lost=rule)
+    study = replace(study, protocol=study.protocol.model_copy(update={"on_fault": on_fault}))
+    orders = {
+        20: [FeedbackLost("screen", "it is black", left_out=True)],
+        40: give(Order.START),
+        60: [Command(Order.WITHOUT, "screen"), *give(Order.START)],
+    }
+    seen = rehearse(study, orders, waits=waits, awaits=("screen",))
+    assert [event.data["by"] for event in seen.events("pause.start")] == (
+        ["feedback screen"] if held else []
+    )
+    begun = [number for number, frame in enumerate(seen.frames) if frame.trial]
+    assert (begun[0] >= 60) == held
+    assert bool(seen.events("order.start")[0].data["refused"]) == (held or not waits)
     assert len(seen.trials()) == 2
 
 
