@@ -57,7 +57,8 @@ def of_design(study: Study) -> list[CheckQuestion]:
 
 
 def test_check_warns_of_a_block_that_gives_every_group_all_feedback_unsaid(tmp_path: Path) -> None:
-    asked, order = of_design(a_study(tmp_path, blocks("pairs: 1", "pairs: 1, feedback: group")))
+    said = of_design(a_study(tmp_path, blocks("pairs: 1", "pairs: 1, feedback: group")))
+    asked, order = sorted(said, key=lambda each: each.key)
     assert "differ in feedback and come in this order for everyone" in order.text
     assert asked.text.startswith("sessions: step 1 of ")
     assert "so that every group is given ball, tone; write feedback: group, none, all" in asked.text
