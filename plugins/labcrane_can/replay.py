@@ -8,6 +8,7 @@ from labcrane import FloatArray, Frame, InputDevice, Machine, ProtocolError, Run
 from labcrane.core import Value
 from labcrane_can.axes import PanelAxes
 from labcrane_can.command_state import PanelCommands
+from labcrane_can.log_file import read_log
 from labcrane_can.settings import ReplaySettings
 
 MICROSECONDS = 6
@@ -39,20 +40,10 @@ class CanReplay(InputDevice):
     """
 
     def __init__(self, settings: ReplaySettings, machine: Machine) -> None:
-        import can  # noqa: PLC0415 - loads for a moment
-
         self._axes = PanelAxes(settings, machine)
         self.signals = self._axes.signals
         self._settings = settings
-        try:
-            with can.LogReader(settings.file) as log:
-                self._frames = list(log)
-                relative = getattr(log, "timestamps_format", "") == "relative"
-        # Of damaged files python-can's readers let through also struct's and zlib's errors.
-        except Exception as error:
-            raise ProtocolError(
-                f"{settings.file} cannot be read as a candump, asc or blf log: {error}"
-            ) from error
+        self._frames, relative, self._torn = read_log(settings.file, settings.bus)
         if not self._frames:
             raise ProtocolError(f"{settings.file} holds no frames, so there is nothing to replay")
         self._times = times_of([frame.timestamp for frame in self._frames], relative=relative)
@@ -93,4 +84,5 @@ class CanReplay(InputDevice):
         return self._axes.given(signals, floats)
 
     def metadata(self) -> Mapping[str, Value]:
-        return {"file": self._settings.file.name, "frames": len(self._frames)}
+        about: dict[str, Value] = {"file": self._settings.file.name, "frames": len(self._frames)}
+        return about | {"torn": self._torn} if self._torn else about

@@ -225,3 +225,6 @@ class ReplaySettings(ValveMap):
 
     file: StudyPath
     """A log of candump, or in Vector's asc or blf format."""
+
+    bus: str | None = None
+    """The panel's bus, where the log has several: ``can0``, or ``1`` in Vector's formats."""

@@ -338,3 +338,68 @@ def test_a_flooded_bus_holds_the_machine_and_says_so() -> None:
             assert not axes.any()
         finally:
             device.close()
+
+
+def test_logs_are_read_as_people_and_loggers_write_them(tmp_path: Path) -> None:
+    """A byte order mark, comments, Windows' line ends, a header in German, and none at all."""
+    plain = {ending: a_log(tmp_path / f"plain.{ending}") for ending in ("log", "asc")}
+    text = {ending: path.read_text() for ending, path in plain.items()}
+    frames = re.sub(r"(?m)^(?! *\d+\.\d).*\n", "", text["asc"])
+    screen = re.sub(
+        r"(?m)^\((\S+)\) (\S+) (\w+)#(\w+).*$",
+        lambda m: (
+            f" ({m[1]})  {m[2]}  {m[3]}   [{len(m[4]) // 2}]  {' '.join(re.findall('..', m[4]))}"
+        ),
+        text["log"],
+    )
+    german = "date Mo M\xe4r 2 11:21:13.191 2026\nbase hex  timestamps absolute\n"
+    written = {
+        "bom.log": ("\ufeff# by hand\n; twice\n\n" + text["log"]).encode(),
+        "windows.log": text["log"].replace("\n", "\r\n").encode(),
+        "screen.log": screen.encode(),
+        "march.asc": (german + frames).encode("cp1252"),
+        "headless.asc": frames.encode(),
+    }
+    expected = commands_of(CanReplay(ReplaySettings(file=plain["log"], valves=VALVES), ch8()), 1200)
+    for name, raw in written.items():
+        (tmp_path / name).write_bytes(raw)
+        device = CanReplay(ReplaySettings(file=tmp_path / name, valves=VALVES), ch8())
+        assert commands_of(device, 1200) == expected, name
+        assert "torn" not in device.metadata()
+
+
+@pytest.mark.parametrize("ending", ["log", "asc"])
+def test_a_last_line_that_was_cut_off_is_no_frame_and_is_recorded(
+    tmp_path: Path, ending: str
+) -> None:
+    path = a_log(tmp_path / f"panel.{ending}")
+    lines = [
+        line for line in path.read_text().splitlines(keepends=True) if re.search(r"\d\.\d", line)
+    ]
+    whole = CanReplay(ReplaySettings(file=path, valves=VALVES), ch8()).metadata()["frames"]
+    frames = [line for line in lines if re.match(r"[ (]*\d+\.\d", line)]
+    path.write_text("".join(frames).rstrip()[: -random.Random(ending).randint(1, 9)])
+    told = CanReplay(ReplaySettings(file=path, valves=VALVES), ch8()).metadata()
+    assert (told["frames"], told["torn"]) == (whole - 1, 1)
+
+
+def test_the_panel_is_on_one_bus_of_a_log_that_has_several(tmp_path: Path) -> None:
+    path = a_log(tmp_path / "panel.log")
+    lines = path.read_text().splitlines()
+    (bus,) = {line.split()[1] for line in lines}
+    foreign = [
+        line.replace(f" {bus} ", " other ")
+        for line in a_log(tmp_path / "x.log", 5).read_text().splitlines()
+    ]
+    both = sorted([*lines, *foreign], key=lambda line: float(line[1:].split(")")[0]))
+    mixed = tmp_path / "mixed.log"
+    mixed.write_text("\n".join(both) + "\n")
+    with pytest.raises(
+        ProtocolError, match=r"frames of the buses .*; name the panel's, as in bus: "
+    ):
+        CanReplay(ReplaySettings(file=mixed, valves=VALVES), ch8())
+    alone, picked = (
+        commands_of(CanReplay(ReplaySettings(file=file, valves=VALVES, bus=bus), ch8()), 1200)
+        for file in (path, mixed)
+    )
+    assert alone == picked
