@@ -1,4 +1,4 @@
-"""The mixed model of drawn people: against lmerTest, analysis of variance, and its own p."""
+"""The mixed model of drawn people: against lme4, analysis of variance, and its own p."""
 
 import math
 from collections.abc import Callable
@@ -11,7 +11,7 @@ import pytest
 
 from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.report.findings import Results
-from labcrane.analysis.statistics.anova import analyse
+from labcrane.analysis.statistics.anova import analyse, compare
 from labcrane.analysis.statistics.mixed import NoModelError, mixed_model
 from results import tested
 from results.consumers import needs_emmeans, r, table
@@ -97,10 +97,10 @@ IN_R = {
     "blocks in sessions": "phase + (1 | participant:of_session) + (1 | participant:of_block)"
     " + (1 | participant:phase)",
 }
-"""What lmerTest is told of a design, besides what every design has."""
+"""What lme4 is told of a design, besides what every design has."""
 
-LMERTEST = """
-suppressMessages(library(lmerTest))
+LME4 = """
+suppressMessages(library(lme4))
 d <- read.csv(commandArgs(TRUE)[1], colClasses = c(phase = "character"))
 say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
 for (cohort in unique(d$cohort)) {
@@ -110,10 +110,24 @@ for (cohort in unique(d$cohort)) {
     "+ (0 + b | participant) + (1 | participant:far_side) +", own$design[1]))
   mm <- suppressWarnings(suppressMessages(lmer(model, own,
     control = lmerControl(optimizer = "bobyqa", optCtrl = list(rhoend = 1e-9)))))
-  found <- coef(summary(mm))
-  for (term in rownames(found)) {
-    parts <- strsplit(term, ":")[[1]]
-    say(paste(cohort, paste(sort(parts, method = "radix"), collapse = ":")), found[term, ])
+  # CR2 by matrices of all movements, where the movements are weighted to the identity.
+  v <- diag(nrow(own)) + as.matrix(crossprod(getME(mm, "Lambdat") %*% getME(mm, "Zt")))
+  white <- solve(t(chol(v)))
+  x <- white %*% getME(mm, "X"); y <- white %*% own$y
+  m <- solve(crossprod(x)); left <- diag(nrow(own)) - x %*% m %*% t(x); e <- left %*% y
+  parts <- lapply(unique(own$participant), function(who) {
+    at <- which(own$participant == who)
+    root <- eigen(left[at, at], symmetric = TRUE)
+    root <- root$vectors %*% (t(root$vectors) / sqrt(root$values))
+    list(at = at, g = root %*% x[at, ] %*% m)
+  })
+  for (k in seq_len(ncol(x))) {
+    g <- sapply(parts, function(p) replace(numeric(nrow(own)), p$at, p$g[, k]))
+    inside <- t(g) %*% left %*% g
+    df <- sum(diag(inside))^2 / sum(inside^2)
+    se <- sqrt(sum((t(g) %*% e)^2)); estimate <- fixef(mm)[[k]]
+    name <- paste(sort(strsplit(names(fixef(mm))[k], ":")[[1]], method = "radix"), collapse = ":")
+    say(paste(cohort, name), estimate, se, df, estimate / se, 2 * pt(-abs(estimate / se), df))
   }
   say(paste(cohort, "fit"), REMLcrit(mm), isSingular(mm))
 }
@@ -129,7 +143,7 @@ def of_r(term: str) -> str:
 
 @pytest.mark.slow
 @needs_emmeans
-def test_the_mixed_model_is_that_of_lmertest_in_designs_of_any_kind(tmp_path: Path) -> None:
+def test_the_mixed_model_is_that_of_lme4_and_its_errors_are_cr2_over_people(tmp_path: Path) -> None:
     cohorts = {
         f"{name} {at}": drawn(at, **DESIGNS[name]).assign(design=model)
         for name, model in IN_R.items()
@@ -137,7 +151,7 @@ def test_the_mixed_model_is_that_of_lmertest_in_designs_of_any_kind(tmp_path: Pa
     }
     path = tmp_path / "movements.csv"
     pd.concat([own.assign(cohort=name) for name, own in cohorts.items()]).to_csv(path, index=False)
-    theirs = {key: np.array(found, float) for key, found in table(r(LMERTEST, path)).items()}
+    theirs = {key: np.array(found, float) for key, found in table(r(LME4, path)).items()}
     singular = equal = 0
     for name, own in cohorts.items():
         model = mixed_model(own, "y")
@@ -184,32 +198,129 @@ def test_the_table_of_type_i_errors(design: str) -> None:
     assert found.between(0.03, 0.07).all(), found.to_string()
 
 
+def of_unlike_people(
+    seed: int,
+    *,
+    people: int = 16,
+    groups: tuple[str, ...] = ("none", "visual"),
+    days: tuple[int, ...] = (3, 1),
+    conditions: str = "",
+    day: float = 0.15,
+    phase: tuple[float, ...] = (0.02,),
+    shared: float = 0.0,
+    tails: float = math.inf,
+    lost: float = 0.0,
+    absent: float = 0.0,
+) -> pd.DataFrame:
+    """Return movements whose variances over people no model of one variance for each factor has.
+
+    A day of a person moves all its phases, phases have spreads of their own, and the response to
+    all conditions except the first is the same within a person. Without any effect.
+    """
+    dice = np.random.default_rng([23, seed])
+
+    def own(size: Any, *shape: int) -> Any:
+        scale = np.sqrt((tails - 2.0) / dice.chisquare(tails, shape)) if tails < math.inf else 1.0
+        return size * scale * dice.standard_normal(shape)
+
+    today, several = np.repeat(np.arange(len(days)), days), len(conditions) or 1
+    rows = []
+    for who in range(people):
+        order = np.roll(np.arange(several), who)[:: 1 if who // several % 2 else -1]
+        mean, of_day, response = own(0.2), own(day, len(days)), own(shared)
+        of_phase = own(np.resize(phase, len(today)), len(today))
+        of_condition = own(phase[0], several) * (several > 1)
+        for at in range(len(today)):
+            if at and dice.random() < absent:
+                continue
+            turn = int(order[at % several])
+            level = mean + of_day[today[at]] + of_phase[at] + of_condition[turn]
+            level += response * (turn > 0)
+            for place, pair in enumerate(dice.permutation(8)):
+                if dice.random() < lost:
+                    continue
+                rows.append(
+                    {"participant": f"P{who:03}", "group": groups[who % len(groups)],
+                     "phase": f"{at + 1}", "condition": conditions[turn : turn + 1],
+                     "sequence": place + 1.0, "difficulty": 2.0 + pair // 4,
+                     "far_side": ("left", "right")[pair % 2],
+                     "y": float(level + 0.4 * (pair // 4) + own(0.12))}
+                )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+CROSSOVER: dict[str, Any] = {
+    "groups": ("",), "days": (1, 1, 1), "conditions": "uvw", "phase": (0.03,), "day": 0.0,
+    "shared": 0.1,
+}  # fmt: skip
+UNLIKE: dict[str, dict[str, Any]] = {
+    "retention on another day": {},
+    "few people, heavy tails": {"people": 10, "tails": TAILS},
+    "phases of unlike spread, unequal groups, missing cells": {
+        "groups": UNEQUAL, "phase": (0.02, 0.04, 0.08, 0.16), "lost": 0.15, "absent": 0.1,
+    },
+    "many people, heavy tails, missing cells": {
+        "people": 24, "phase": (0.2, 0.02, 0.02, 0.1), "tails": TAILS, "lost": 0.1, "absent": 0.15,
+    },
+    "one response to two feedbacks": {"people": 18, **CROSSOVER},
+    "one response of few people": {"people": 12, "lost": 0.1, **CROSSOVER},
+    "one response of eight people, heavy tails": {"people": 8, "tails": TAILS, **CROSSOVER},
+}  # fmt: skip
+"""Studies of such people."""
+
+
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("design", "asked"),
+    [
+        ("retention on another day", ["phase[T.4]", "group[T.visual]:phase[T.4]"]),
+        ("one response to two feedbacks", ["condition[T.v]", "condition[T.w]"]),
+    ],
+)
+def test_people_may_differ_in_another_way_than_the_random_terms(
+    design: str, asked: list[str]
+) -> None:
+    found = [mixed_model(of_unlike_people(at, **UNLIKE[design]), "y").terms for at in range(60)]
+    p = pd.DataFrame([own.set_index("term")["p"] for own in found])[asked]
+    assert 1 <= (p < 0.05).sum().sum() <= 12  # of 120, 6 are expected; 12 % would be 14
+
+
+@pytest.mark.long
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("design", UNLIKE)
+def test_the_table_of_type_i_errors_of_unlike_people(design: str) -> None:
+    rows = [mixed_model(of_unlike_people(at, **UNLIKE[design]), "y").terms for at in range(1_000)]
+    p = pd.DataFrame([own.set_index("term")["p"] for own in rows])
+    found = (p.drop(columns=["Intercept", "difficulty"]) < 0.05).mean()
+    assert found.between(0.03, 0.07).all(), found.to_string()
+
+
 @pytest.mark.parametrize("differ", [0.0, 0.2, 0.5])
 def test_in_a_balanced_design_the_model_and_the_analysis_of_variance_agree(differ: float) -> None:
-    """Where people differ from phase to phase by less than chance, the model pools, and only there.
-
-    The mean square of participants by phase is then below that of the residual.
-    """
-    pooled = 0
-    for at in range(12):
+    """However much people differ from phase to phase, and so in phases of another spread too."""
+    for at in range(3):
         both = drawn(at, differ=differ)
-        model = mixed_model(both, "y")
         rows = {row.factor: row for row in analyse(both, "y", ["phase"], ["group"])}
         theirs = rows["group:phase"]
-        ours = model.terms.set_index("term").loc["group[T.visual]:phase[T.2]"]
-        if "(1 | participant:phase)" in model.random:
-            assert (ours["t"] ** 2, ours["df"]) == pytest.approx((theirs.f, theirs.df2), rel=1e-3)
-            assert ours["p"] == pytest.approx(theirs.p, abs=1e-3)
-            continue
-        pooled += 1
-        assert "(1 | participant:phase)" in model.zero
-        wide = both.groupby(["group", "participant", "phase"])["y"].mean().unstack("phase")
-        change = wide["2"] - wide["1"]
-        within = change - change.groupby("group").transform("mean")
-        assert 8 * (within**2).sum() / (2 * 14) < model.residual_sd**2 * (1.0 + 1e-6)
-        assert ours["df"] > theirs.df2
-    assert pooled == 0 if differ == 0.5 else pooled < 12
+        ours = mixed_model(both, "y").terms.set_index("term").loc["group[T.visual]:phase[T.2]"]
+        assert (ours["t"] ** 2, ours["df"]) == pytest.approx((theirs.f, theirs.df2), rel=1e-3)
+        assert ours["p"] == pytest.approx(theirs.p, abs=1e-3)
+        three = of_unlike_people(at, groups=("",), phase=(differ, 0.1, 0.02, 0.3))
+        terms = mixed_model(three, "y").terms.set_index("term")
+        for one in compare(three, "y", "phase", ["phase"])[:3]:
+            ours = terms.loc[f"phase[T.{one.second}]"]
+            assert ours["estimate"] == pytest.approx(-one.difference, rel=1e-6)
+            assert (ours["se"], ours["df"]) == pytest.approx((one.se, one.df), rel=1e-6)
+
+
+def test_a_term_that_rests_on_one_participant_is_not_tested() -> None:
+    cohort = drawn(4, blocks=3, groups=UNEQUAL)
+    last = (cohort["group"] == "visual") & (cohort["phase"] == "3")
+    (one, *_) = cohort["participant"][last]
+    model = mixed_model(cohort[~last | (cohort["participant"] == one)], "y")
+    untested = set(model.terms["term"][model.terms["p"].isna()])
+    assert untested == {"group[T.visual]:phase[T.3]"}
+    assert model.terms["se"].isna().sum() == 1
 
 
 def test_conditions_of_blocks_in_one_order_are_said_to_be_one_with_the_blocks() -> None:

@@ -530,8 +530,9 @@ def _of_model(model: MixedModel) -> Iterator[str]:
     yield (
         f"Mixed model of {model.measure}: {model.formula}, sequence and difficulty centred; "
         f"{model.n} movements{without} of {model.participants} participants. Standard deviations "
-        f"over participants: {spread or 'none'}; residual {model.residual_sd:.3g}; degrees of "
-        "freedom after Satterthwaite."
+        f"over participants: {spread or 'none'}; residual {model.residual_sd:.3g}. Tests do "
+        "not assume that these are right: standard errors are of each participant's own part in "
+        "a term (CR2), with the degrees of freedom of Bell and McCaffrey."
     )
     if model.measure in TIMES and not model.log:
         yield "It is modelled untransformed, since a value of 0 or less has no logarithm."
@@ -549,6 +550,8 @@ def _of_model(model: MixedModel) -> Iterator[str]:
             f"Terms without a group are those of the first one, {model.reference}; terms with a "
             "group are differences from it."
         )
+    for name in model.terms["term"][model.terms["p"].isna()]:
+        yield f"{name} is not tested: the estimate rests on one participant."
     for name in model.dropped:
         yield f"{name} is not in the model: it cannot be distinguished from the other terms."
 

@@ -4,13 +4,17 @@ People differ in every effect that varies within them, so each has a variance ov
 Levy, Scheepers & Tily 2013, Journal of Memory and Language 68:255): without it, movements of one
 person would count as independent tests of the effect. Fitted as lme4 fits it (Bates, Mächler,
 Bolker & Walker 2015, Journal of Statistical Software 67:1): the restricted likelihood is profiled
-over all but the variances relative to the residual. Tests are t tests with the degrees of freedom
-of Satterthwaite, as lmerTest makes them (Kuznetsova, Brockhoff & Christensen 2017, the same journal
-82:13).
+over all but the variances relative to the residual.
+
+The random terms weight the movements; the tests do not assume that they are true. The standard
+error of a term is of the variation, over participants, of each one's own part in it: the robust
+variance CR2 of Bell & McCaffrey 2002 (Survey Methodology 28:169), with their degrees of freedom
+(Pustejovsky & Tipton 2018, Journal of Business & Economic Statistics 36:672). In a balanced
+complete design this is the t test of each participant's own difference.
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -62,6 +66,9 @@ FLAT = 1e-7
 STARTS = (1.0, 0.05)
 """Start values of the variances over the residual; the best result is used."""
 
+ONE_PERSON = 1e-6
+"""Share of a term's variance over people that is not observed where it rests on one of them."""
+
 
 class NoModelError(Exception):
     """A model cannot be fitted; the message gives the reason."""
@@ -92,8 +99,9 @@ class MixedModel:
     formula
         The fitted model as lme4 writes it.
     terms
-        One row per fixed term: term, estimate, standard error, t, Satterthwaite's degrees of
-        freedom, p, and the terms left out that it cannot be distinguished from.
+        One row per fixed term: term, estimate, robust standard error, t, degrees of freedom, p,
+        and the terms left out that it cannot be distinguished from. The errors and tests of a term
+        that rests on one participant are nan.
     dropped
         Terms that follow from the others here, as where one group lacks one phase; not estimated.
     random
@@ -171,7 +179,7 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel:
             "residual variance is left to test against"
         )
     fit = _Fit(x, y, list(random.values()), ones, scatter)
-    errors, freedom = fit.errors, fit.freedom
+    errors, freedom = fit.errors_and_freedom
     t = fit.estimates / errors
     terms = pd.DataFrame(
         {
@@ -374,20 +382,26 @@ class _Fit:
         self._zz = np.stack([z[own].T @ z[own] for own in ones])
         self._zx = np.stack([z[own].T @ self._x[own] for own in ones])
         self._zy = np.stack([z[own].T @ rest[own] for own in ones])
+        self._xx = np.stack([self._x[own].T @ self._x[own] for own in ones])
+        self._xy = np.stack([self._x[own].T @ rest[own] for own in ones])
         self._yy = float(rest @ rest)
         self._theta = np.sqrt(self._fitted())
-        self._there = self._theta > 0.0
 
-    def _solved(self, theta: FloatArray) -> tuple[float, FloatArray, FloatArray, float]:
-        """Return log determinants, x'V⁻¹x, the estimates, and the weighted sum of squares.
+    def _whitened(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return each participant's Cholesky factor, and what it leaves of z'x and z'y.
 
         By the terms' standard deviations over the residual's.
         """
         factor = theta[self._term]
         inner = np.eye(len(factor)) + factor[:, None] * self._zz * factor
-        lower = np.linalg.cholesky(inner)
-        zx = np.linalg.solve(lower, factor[:, None] * self._zx)
-        zy = np.linalg.solve(lower, (self._zy * factor)[..., None])[..., 0]
+        lower: FloatArray = np.linalg.cholesky(inner)
+        zx: FloatArray = np.linalg.solve(lower, factor[:, None] * self._zx)
+        zy = np.asarray(np.linalg.solve(lower, (self._zy * factor)[..., None])[..., 0], float)
+        return lower, zx, zy
+
+    def _solved(self, theta: FloatArray) -> tuple[float, FloatArray, FloatArray, float]:
+        """Return log determinants, x'V⁻¹x, the estimates, and the weighted sum of squares."""
+        lower, zx, zy = self._whitened(theta)
         xvx = np.eye(self._p) - np.einsum("mqp,mqr->pr", zx, zx)
         xvy = -np.einsum("mqp,mq->p", zx, zy)
         estimates = np.linalg.solve(xvx, xvy)
@@ -462,65 +476,34 @@ class _Fit:
         own = self._solved(self._theta)[2] * self._y_scale + self._first
         return np.linalg.solve(self._back, own)
 
-    @property
-    def _both(self) -> FloatArray:
-        """The deviations that are not zero, over the residual's, and the residual's."""
-        return np.array([*self._theta[self._there], self._sigma])
+    @cached_property
+    def errors_and_freedom(self) -> tuple[FloatArray, FloatArray]:
+        """Standard errors of the fixed terms and their degrees of freedom; nan if not known.
 
-    def _whole(self, both: FloatArray) -> FloatArray:
-        theta = np.zeros(len(self._theta))
-        theta[self._there] = both[:-1]
-        return theta
-
-    def _deviance(self, both: FloatArray) -> float:
-        """Return the deviance by the parameters that are not zero."""
-        logs, _, _, squares = self._solved(self._whole(both))
-        free = self._n - self._p
-        return float(logs + 2.0 * free * np.log(both[-1]) + squares / both[-1] ** 2)
-
-    def _variances(self, both: FloatArray) -> FloatArray:
-        """Return the fixed terms' variances by the parameters of the deviance."""
-        inverse = np.linalg.inv(self._back)
-        spread = both[-1] ** 2 * np.linalg.inv(self._solved(self._whole(both))[1])
-        return np.asarray(np.einsum("ij,jk,ik->i", inverse, spread, inverse))
-
-    @property
-    def errors(self) -> FloatArray:
-        """Standard errors of the fixed terms."""
-        return np.asarray(np.sqrt(self._variances(self._both)) * self._y_scale)
-
-    @property
-    def freedom(self) -> FloatArray:
-        """Satterthwaite's degrees of freedom of the fixed terms."""
-        spread = 2.0 * np.linalg.inv(_hessian(self._deviance, self._both))
-        slopes = _slopes(self._variances, self._both)
-        variances = self._variances(self._both)
-        return np.asarray(2.0 * variances**2 / np.einsum("ki,kl,li->i", slopes, spread, slopes))
-
-
-STEP = 1e-4
-"""Of parameters that are about 1, for derivatives; of larger ones, their share."""
-
-
-def _slopes(of: Callable[[FloatArray], FloatArray], at: FloatArray) -> FloatArray:
-    """Return the derivatives of a function by each parameter, one row each."""
-    sizes = STEP * np.maximum(1.0, np.abs(at))
-    return np.stack(
-        [(of(at + step) - of(at - step)) / (2.0 * step.sum()) for step in np.diag(sizes)]
-    )
-
-
-def _hessian(of: Callable[[FloatArray], float], at: FloatArray) -> FloatArray:
-    """Return the second derivatives of a function."""
-    sizes = STEP * np.maximum(1.0, np.abs(at))
-    steps = np.diag(sizes)
-    made = np.array(
-        [
-            [
-                (of(at + one + two) - of(at + one - two) - of(at - one + two) + of(at - one - two))
-                for two in steps
-            ]
-            for one in steps
-        ]
-    )
-    return made / (4.0 * np.outer(sizes, sizes))
+        An estimate is a sum of one part of each participant, whose squares add to its variance
+        once each is enlarged by what the participant took out of the residuals.
+        """
+        _, zx, zy = self._whitened(self._theta)
+        of_each = self._xx - zx.transpose(0, 2, 1) @ zx
+        lower = np.linalg.cholesky(of_each.sum(axis=0))
+        inverse = np.linalg.inv(lower)
+        share = inverse @ of_each @ inverse.T  # over all participants, these add to the identity
+        scores = self._xy - np.einsum("mqp,mq->mp", zx, zy)
+        rest = (scores @ inverse.T) - share @ (inverse @ scores.sum(axis=0))
+        sizes, axes = np.linalg.eigh(share)
+        left = 1.0 - sizes
+        larger = np.where(left > DEPENDENT, left.clip(DEPENDENT) ** -0.5, 0.0)
+        enlarged = (axes * larger[:, None]) @ axes.transpose(0, 2, 1)
+        terms = inverse @ np.linalg.inv(self._back).T
+        asked = enlarged @ terms
+        variances = (np.einsum("mp,mpk->mk", rest, asked) ** 2).sum(axis=0)
+        # Covariances of the parts, were the random terms true.
+        seen = share @ asked
+        own = np.einsum("mpk,mpk->mk", asked, seen)
+        cross = -np.einsum("mpk,npk->kmn", seen, seen)
+        people = np.arange(len(own))
+        cross[:, people, people] += own.T
+        expected = np.einsum("kmm->k", cross)
+        known = expected > (1.0 - ONE_PERSON) * (terms**2).sum(axis=0)
+        errors = np.where(known, np.sqrt(variances) * self._y_scale, np.nan)
+        return errors, np.where(known, expected**2 / (cross**2).sum(axis=(1, 2)), np.nan)
