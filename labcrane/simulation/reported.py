@@ -258,10 +258,11 @@ def _contrast(planned: PlannedTest, results: "pd.DataFrame") -> ReportedTest:
     effect, factors = planned.effect, planned.factors
     one, other = planned.pair
     within = [*factors.over_phases, *[name for name in (effect.factor,) if name == DISTANCE]]
-    asked = column(effect.factor, factors)
+    asked, period = column(effect.factor, factors), ""
     if asked == CONDITION:
-        results, within = outcomes.CONDITIONS.of(results), [CONDITION]
-    for row in compare(results, effect.measure, asked, within, factors.between):
+        plan = outcomes.CONDITIONS
+        results, within, period = plan.of(results), [CONDITION], plan.period
+    for row in compare(results, effect.measure, asked, within, factors.between, period=period):
         if {row.first, row.second} == {one, other}:
             # Other minus one, as the effect is written; the report's is first minus second.
             sign = -1.0 if row.second == other else 1.0

@@ -1,15 +1,19 @@
 """A crossover of two conditions in the report: the effect put in, against SciPy and statsmodels."""
 
+import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from rehearsal import SHORT
-from scipy.stats import ttest_rel
-from statsmodels.stats.anova import AnovaRM
+from scipy.stats import ttest_ind
+from statsmodels.formula.api import ols
+from statsmodels.stats.anova import anova_lm
 
 from labcrane.analysis.report import outcomes
+from labcrane.analysis.report.answer import _effects
 from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.report.findings import Results, of_scores
 from labcrane.analysis.report.words import STYLES, paragraphs
@@ -17,6 +21,7 @@ from labcrane.cli.app import main
 from labcrane.simulation.power import Claim, read_effect
 from labcrane.simulation.reported import ask, plan_test
 from results import tested
+from results.consumers import needs_emmeans, r, table
 from results.undrawn import without_figures
 
 EFFECT = 0.6
@@ -55,37 +60,135 @@ def of_condition(table: pd.DataFrame, movements: pd.DataFrame) -> pd.Series:
     return found
 
 
+def of_orders(values: pd.DataFrame, value: str, place: str) -> Any:
+    """Return the t test between orders of half of second minus first (Jones & Kenward)."""
+    each = values.groupby(["participant", "condition"]).agg({value: "mean", place: "min"})
+    wide = each[value].unstack().dropna()
+    first = each[place].unstack().loc[wide.index].idxmin(axis=1)
+    plain = first == "plain"
+    change = (wide["tone"] - wide["plain"]) * np.where(plain, 0.5, -0.5)
+    return ttest_ind(-change[plain], -change[~plain])
+
+
+@pytest.mark.parametrize("left", [16, 13, 11])
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_two_conditions_are_compared_as_a_paired_test_does_and_the_effect_is_found(
-    seed: int,
+def test_two_conditions_are_compared_between_orders_and_the_effect_is_found(
+    seed: int, left: int
 ) -> None:
+    """Half of each person's change, of those who began with one against those with the other."""
     movements = crossover(seed, 16, ("plain", "tone"))
-    means = movements.groupby(["participant", "condition"])["movement_time"].mean().unstack()
-    theirs = ttest_rel(means["plain"], means["tone"])
+    gone = [f"P{person:03}" for person in range(0, 2 * (16 - left), 2)]  # all of one order
+    movements = movements[~movements["participant"].isin(gone)]
+    theirs = of_orders(movements, "movement_time", "block")
     anova = of_condition(tested.anova_table, movements)
     assert anova["f"] == pytest.approx(theirs.statistic**2)
-    assert (anova["df1"], anova["df2"], anova["n"]) == (1, 15, 16)
+    assert (anova["df1"], anova["df2"], anova["n"]) == (1, left - 2, left)
     assert anova["p"] == pytest.approx(theirs.pvalue)
     assert not anova["confounded"]
     contrast = of_condition(tested.contrast_table, movements)
-    assert contrast["difference"] == pytest.approx((means["plain"] - means["tone"]).mean())
     low, high = theirs.confidence_interval(0.95)
+    assert contrast["difference"] == pytest.approx((low + high) / 2.0)
     assert (contrast["ci_low"], contrast["ci_high"]) == pytest.approx((low, high))
     assert abs(contrast["difference"] + EFFECT) < 3.0 * contrast["se"]
+    learned = movements.assign(movement_time=movements["movement_time"] - 5.0 * movements["block"])
+    again = of_condition(tested.anova_table, learned)
+    assert again["f"] == pytest.approx(anova["f"]), "what changes by block changes no test"
 
 
-def test_three_conditions_are_tested_as_statsmodels_does() -> None:
-    movements = crossover(5, 18, ("a", "b", "c"))
-    theirs = (
-        AnovaRM(
-            movements, "movement_time", "participant", within=["condition"], aggregate_func="mean"
-        )
-        .fit()
-        .anova_table.iloc[0]
+def test_means_beside_the_test_of_conditions_are_without_the_period() -> None:
+    movements = crossover(2, 16, ("plain", "tone"))
+    movements = movements[movements["participant"].isin([f"P{n:03}" for n in (*range(12), 12, 14)])]
+    factors = factors_of(movements)
+    results = Results("", tested.COUNTS, factors, tested.every_finding(movements, factors))
+    (said,) = (text for text in _effects(movements, results) if text.startswith("Movement time"))
+    found = re.search(r"over condition \(plain: ([\d.]+), tone: ([\d.]+); F\(1, 12\)", said)
+    assert found
+    plain, tone = map(float, found.groups())
+    difference = of_condition(tested.contrast_table, movements)["difference"]
+    assert plain - tone == pytest.approx(difference, abs=0.011)
+    means = movements.groupby(["condition", "participant"])["movement_time"].mean()
+    raw = means.groupby(level=0).mean()
+    assert abs(raw["plain"] - raw["tone"] - difference) > 0.05, "the orders are not even"
+    words = " ".join(paragraphs(results, STYLES["html"]))
+    assert re.search(
+        r"over condition, F\(1, 12\) = [\d.]+, p [=<] [\d.]+, ηp² = .\d+, period", words
     )
+    assert re.search(
+        r"plain minus tone: .*?Holm-corrected p [=<] [\d.]+, period taken out\.", words
+    )
+
+
+OF_PERIODS = """
+suppressMessages(library(afex))
+d <- read.csv(commandArgs(TRUE)[1])
+say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
+for (cohort in unique(d$cohort)) {
+  own <- d[d$cohort == cohort, ]
+  own$period <- factor(own$period)
+  found <- drop1(lm(y ~ participant + period + condition, own), ~ ., test = "F")
+  rest <- df.residual(lm(y ~ participant + period + condition, own))
+  say(cohort, found["condition", "F value"], found["condition", "Df"], rest,
+    found["condition", "Pr(>F)"])
+  if (length(unique(own$condition)) == 2) {
+    own$order <- ave(own$condition, own$participant, FUN = function(x) x[1])
+    mixed <- suppressMessages(aov_ez("participant", "y", own, within = "condition",
+      between = "order"))$anova_table["condition", ]
+    say(paste(cohort, "orders"), mixed$F, mixed$`num Df`, mixed$`den Df`, mixed$`Pr(>F)`)
+  }
+}
+"""
+
+
+@pytest.mark.slow
+@needs_emmeans
+def test_conditions_are_tested_as_r_does_with_the_period(tmp_path: Path) -> None:
+    dice = np.random.default_rng(31)
+    ours, parts = {}, []
+    for at in range(24):
+        names = ("a", "b", "c")[: 2 + at % 2]
+        people = int(dice.integers(5 + 3 * (at % 2), 20))
+        movements = crossover(100 + at, people, names)
+        gone = [f"P{n:03}" for n in dice.choice(people, people // 6, replace=False)]
+        last = movements["block"] == len(names)  # they left before the end
+        movements = movements[~(movements["participant"].isin(gone) & last)]
+        row = of_condition(tested.anova_table, movements)
+        ours[f"c{at}"] = row[["f", "df1", "df2", "p"]].to_numpy(float)
+        whole = movements[~movements["participant"].isin(gone)]
+        means = whole.groupby(["participant", "block", "condition"])["movement_time"].mean()
+        cells = means.rename("y").reset_index().rename(columns={"block": "period"})
+        parts.append(cells.assign(cohort=f"c{at}"))
+    path = tmp_path / "cells.csv"
+    pd.concat(parts).to_csv(path, index=False)
+    theirs = table(r(OF_PERIODS, path))
+    assert len(theirs) == 24 + 12
+    for name, found in theirs.items():
+        expected = np.array(found, float)
+        np.testing.assert_allclose(ours[name.split()[0]], expected, rtol=1e-6, err_msg=name)
+
+
+def test_what_is_lost_of_four_blocks_costs_no_degrees_of_freedom() -> None:
+    """ABBA and BAAB: the mean of a condition is of two blocks, also where movements are lost."""
+    two = [crossover(7, 12, ("plain", "tone")).assign(half=half) for half in (0, 1)]
+    both = pd.concat(two, ignore_index=True)
+    both["block"] = both["block"].where(both["half"] == 0, 5 - both["block"])
+    both["block_name"] = "b" + both["block"].astype(str)
+    both = with_factors(both[["participant", "session", "session_name", "block", "block_name",
+        "condition", "sequence", "trial", "distance", "far_side", "difficulty", "movement_time",
+        "practice", "outcome"]].sort_values(["participant", "block", "sequence"]))  # fmt: skip
+    few = both.drop(index=np.random.default_rng(2).choice(both.index, 20, replace=False))
+    assert of_condition(tested.anova_table, both)["df2"] == 10
+    assert of_condition(tested.anova_table, few)["df2"] == 10
+
+
+@pytest.mark.parametrize("people", [9, 18])
+def test_three_conditions_are_tested_as_statsmodels_does_with_the_period(people: int) -> None:
+    movements = crossover(5, people, ("a", "b", "c"))
+    cells = movements.groupby(["participant", "block", "condition"])["movement_time"].mean()
+    model = ols("movement_time ~ participant + C(block) + condition", cells.reset_index()).fit()
+    theirs = anova_lm(model, typ=2).loc["condition"]
     ours = of_condition(tested.anova_table, movements)
-    assert (ours["f"], ours["p"]) == pytest.approx((theirs["F Value"], theirs["Pr > F"]))
-    assert (ours["df1"], ours["df2"]) == (2, 34)
+    assert (ours["f"], ours["p"]) == pytest.approx((theirs["F"], theirs["PR(>F)"]))
+    assert (ours["df1"], ours["df2"]) == (2, 2 * people - 4)
 
 
 def test_who_lacks_a_condition_is_left_out_by_name() -> None:
@@ -156,7 +259,7 @@ def asked_after(movements: pd.DataFrame, seed: int) -> pd.DataFrame:
     return pd.DataFrame([*rows, *last])
 
 
-def test_a_score_is_tested_over_conditions_as_a_paired_test_does() -> None:
+def test_a_score_is_tested_over_conditions_with_the_occasion_taken_out() -> None:
     movements = crossover(3, 13, ("plain", "tone"))
     people = dict.fromkeys(sorted(set(movements["participant"])), "")
     scores = outcomes.with_conditions(asked_after(movements, 4), movements)
@@ -164,7 +267,7 @@ def test_a_score_is_tested_over_conditions_as_a_paired_test_does() -> None:
     tests = tested.score_tests(scores, people).set_index("factor")
     first = scores[scores["step"] < 5.0]
     means = first.pivot_table(values="value", index="participant", columns="condition").dropna()
-    theirs = ttest_rel(means["plain"], means["tone"])
+    theirs = of_orders(first.rename(columns={"value": "raw"}), "raw", "step")
     row = tests.loc["condition"]
     assert (row["f"], row["p"]) == pytest.approx((theirs.statistic**2, theirs.pvalue))
     assert (row["n"], row["left_out"], row["confounded"]) == (12, "P003", "")
@@ -210,8 +313,8 @@ def test_orders_that_were_not_had_equally_often_are_told_with_their_numbers(peop
     else:
         assert found == (
             "Conditions were not equally frequent at each place: in 1 b1, "
-            f"a for {first[0]}, b for {first[1]} and c for {first[2]} participants; differences "
-            "between conditions include part of the change from place to place."
+            f"a for {first[0]}, b for {first[1]} and c for {first[2]} participants; plain means of "
+            "conditions include part of the change from place to place, which their tests take out."
         )
 
 

@@ -20,13 +20,19 @@ if ("presentation_failed" %in% names(results)) {  # the picture froze: not a val
 rank <- function(x) match(x, sort(unique(x)))
 results$sequence <- ave(results$sequence, results$participant, results$block, FUN = rank)
 
+# The condition that a participant began with: between people, it takes the period, which is the
+# block, out of the condition.
+begun <- results[order(results$block), ]
+begun <- begun[!duplicated(begun$participant), ]
+results$began <- begun$condition[match(results$participant, begun$participant)]
+
 # Test the design and return the effects that involve all factors in `of`.
-test <- function(data, measure, within, of = within) {
-  fit <- aov_ez("participant", measure, data, within = within, fun_aggregate = mean)
+test <- function(data, measure, within, of = within, between = NULL) {
+  fit <- aov_ez("participant", measure, data, between, within, fun_aggregate = mean)
   plain <- anova(fit, correction = "none")
   corrected <- anova(fit, correction = "GG")
   effects <- rownames(plain)
-  asked <- sapply(strsplit(effects, ":"), function(parts) all(of %in% parts))
+  asked <- sapply(strsplit(effects, ":"), function(parts) all(of %in% parts, !between %in% parts))
   data.frame(
     measure = measure, factor = effects, f = plain[, "F"], df1 = plain[, "num Df"],
     df2 = plain[, "den Df"], p = plain[, "Pr(>F)"], p_gg = corrected[effects, "Pr(>F)"]
@@ -35,19 +41,19 @@ test <- function(data, measure, within, of = within) {
 
 # A questionnaire after a block belongs to the block's condition.
 raw <- subset(read.csv(file.path(folder, "scores.csv")), questionnaire == "load" & score == "raw")
-about <- unique(results[c("participant", "block", "condition")])
+about <- unique(results[c("participant", "block", "condition", "began")])
 raw <- merge(raw, about, by = c("participant", "block"))
 raw[["load raw"]] <- raw$value
 raw$occasion <- raw$step
 
 found <- suppressMessages(rbind(
-  test(results, "movement_time", "condition"),  # the study's research question
+  test(results, "movement_time", "condition", between = "began"),  # the study's research question
   test(results, "movement_time", "block"),      # first or second: learning
   test(results, "movement_time", c("block", "sequence"), "sequence"),
   test(results, "movement_time", c("block", "distance"), "distance"),
   test(results, "movement_time", c("block", "far_side"), "far_side"),
   test(results, "movement_time", c("distance", "far_side")),
-  test(raw, "load raw", "condition"),
+  test(raw, "load raw", "condition", between = "began"),
   test(raw, "load raw", "occasion")
 ))
 write.csv(found, "analysis.csv", row.names = FALSE)

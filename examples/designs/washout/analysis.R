@@ -19,13 +19,19 @@ if ("presentation_failed" %in% names(results)) {  # the picture froze: not a val
 rank <- function(x) match(x, sort(unique(x)))
 results$sequence <- ave(results$sequence, results$participant, results$session, FUN = rank)
 
+# The condition that a participant began with: between people, it takes the period, which is the
+# session, out of the condition.
+begun <- results[order(results$session), ]
+begun <- begun[!duplicated(begun$participant), ]
+results$began <- begun$condition[match(results$participant, begun$participant)]
+
 # Test the design and return the effects that involve all factors in `of`.
-test <- function(data, measure, within, of = within) {
-  fit <- aov_ez("participant", measure, data, within = within, fun_aggregate = mean)
+test <- function(data, measure, within, of = within, between = NULL) {
+  fit <- aov_ez("participant", measure, data, between, within, fun_aggregate = mean)
   plain <- anova(fit, correction = "none")
   corrected <- anova(fit, correction = "GG")
   effects <- rownames(plain)
-  asked <- sapply(strsplit(effects, ":"), function(parts) all(of %in% parts))
+  asked <- sapply(strsplit(effects, ":"), function(parts) all(of %in% parts, !between %in% parts))
   data.frame(
     measure = measure, factor = effects, f = plain[, "F"], df1 = plain[, "num Df"],
     df2 = plain[, "den Df"], p = plain[, "Pr(>F)"], p_gg = corrected[effects, "Pr(>F)"]
@@ -33,7 +39,7 @@ test <- function(data, measure, within, of = within) {
 }
 
 found <- suppressMessages(rbind(
-  test(results, "movement_time", "condition"),  # the study's research question
+  test(results, "movement_time", "condition", between = "began"),  # the study's research question
   test(results, "movement_time", "session"),    # first or second day
   test(results, "movement_time", c("session", "sequence"), "sequence"),
   test(results, "movement_time", c("session", "distance"), "distance"),

@@ -190,7 +190,7 @@ def conditions_in(table: "pd.DataFrame") -> tuple[str, ...]:
 def _uneven(results: "pd.DataFrame", conditions: tuple[str, ...]) -> str:
     """Return the first phase in which some conditions had more people than others, in a sentence.
 
-    For those who have results of all conditions, and so are in their test. Differences between
+    For those who have results of all conditions, and so are in their test. Plain means of
     conditions then include part of the learning from phase to phase. If all had the same order,
     tests report the confound.
     """
@@ -207,8 +207,9 @@ def _uneven(results: "pd.DataFrame", conditions: tuple[str, ...]) -> str:
         if counts.nunique() > 1 or len(counts) < len(conditions):
             return (
                 f"Conditions were not equally frequent at each place: in {phase}, "
-                f"{', '.join(people[:-1])} and {people[-1]} participants; differences between "
-                "conditions include part of the change from place to place."
+                f"{', '.join(people[:-1])} and {people[-1]} participants; plain means of "
+                "conditions include part of the change from place to place, which their tests "
+                "take out."
             )
     return ""
 

@@ -12,6 +12,7 @@ from labcrane.analysis.quality import is_success
 from labcrane.analysis.report.factors import CONDITION, DISTANCE, GROUP, PHASE, PLACE, Factors
 from labcrane.analysis.report.outcomes import (
     ADJUSTED,
+    ORDER,
     PRACTICE,
     SCORE_CONDITIONS,
     SCORE_OCCASIONS,
@@ -373,7 +374,9 @@ class _PlanRun:
         tests = {tuple(test.factor.split(":")): test for test in plan.tests(cells, self.measure)}
         for columns, test in tests.items():
             name, confounded = self._name(columns), ""
-            if columns == (plan.asked or tuple(each for each in columns if each != GROUP)):
+            if plan.period:
+                confounded = "" if test.beside else ORDER
+            elif columns == (plan.asked or tuple(each for each in columns if each != GROUP)):
                 confounded = plan.confounded(self.done, self.measure, test.people, columns)
             short = self._without(columns) if columns in planned else ()
             yield finding(name, replace(test, factor=name, confounded=confounded), short, columns)

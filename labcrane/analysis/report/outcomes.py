@@ -83,6 +83,8 @@ class Plan:
         Columns that a requested effect must include; without any, every effect is requested.
     beside
         Column that identifies pairs, where the effect is adjusted for them; otherwise empty.
+    period
+        Column of what comes with the order of conditions, taken out where it can be told from them.
     phase
         The only phase whose movements are in it; empty for all.
     confusable
@@ -94,6 +96,7 @@ class Plan:
     beside: str = ""
     phase: str = ""
     confusable: Confusable = ()
+    period: str = ""
 
     @property
     def suffix(self) -> str:
@@ -115,13 +118,22 @@ class Plan:
         self, results: "pd.DataFrame", measure: str, between: Sequence[str]
     ) -> FactorialDesign:
         """Return the participants' means of a measure in its cells."""
-        return design(self.of(results), measure, self.within, between, self.beside)
+        return design(self.of(results), measure, self.within, between, self.beside, self.period)
 
     def tests(self, cells: FactorialDesign, measure: str) -> Iterator[Anova]:
-        """Yield the requested tests; one that was to be adjusted and was not is left out."""
-        for test in effects_in(cells, measure, self.beside):
-            if set(self.asked) <= set(test.factor.split(":")) and test.beside == self.beside:
-                yield test
+        """Yield the requested tests; one that was to be adjusted for pairs and was not is left out.
+
+        Conditions that cannot be told from their period are tested with it.
+        """
+        found = [
+            test
+            for test in effects_in(cells, measure, self.beside or self.period)
+            if set(self.asked) <= set(test.factor.split(":"))
+            and (self.period or test.beside == self.beside)
+        ]
+        if self.period and not found and cells.beside.shape[2]:
+            yield from self.tests(replace(cells, beside=cells.beside[:, :, :0]), measure)
+        yield from found
 
     def confounded(
         self,
@@ -155,11 +167,11 @@ class Plan:
         return " and ".join(found)
 
 
-CONDITIONS = Plan((CONDITION,), (CONDITION,), confusable=((ORDER, (PHASE,)),))
-"""Conditions within participants, over the means of all their blocks."""
+CONDITIONS = Plan((CONDITION,), (CONDITION,), period=PHASE)
+"""Conditions within participants, over the means of all their blocks, with the period taken out."""
 
 SCORE_OCCASIONS = Plan((OCCASION,), confusable=(("conditions", (CONDITION,)),))
-SCORE_CONDITIONS = Plan((CONDITION,), (CONDITION,), confusable=((ORDER, (OCCASION,)),))
+SCORE_CONDITIONS = Plan((CONDITION,), (CONDITION,), period=OCCASION)
 """Scores of questionnaires, over when they were asked, and over the conditions before."""
 
 
@@ -291,10 +303,8 @@ def contrasts(study: StudyMovements) -> list[Contrast]:
             found.append(replace(one, confounded=confounded))
         if factors.conditions:
             own = CONDITIONS.of(results)
-            for one in compare(own, measure, CONDITION, CONDITIONS.within, between):
-                two = own[own[CONDITION].isin([one.first, one.second])]
-                confounded = CONDITIONS.confounded(two, measure, one.people)
-                found.append(replace(one, confounded=confounded))
+            asked = compare(own, measure, CONDITION, (CONDITION,), between, period=PHASE)
+            found += [replace(one, confounded="" if one.beside else ORDER) for one in asked]
     return [replace(one, factor=named_factor(one.factor, factors)) for one in found]
 
 

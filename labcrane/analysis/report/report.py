@@ -436,6 +436,11 @@ def _statistics(page: Page, found: Results, measures: Sequence[str]) -> None:
                 "is compared with its pair's average, which is estimated too and costs degrees of "
                 "freedom."
             )
+        if any(test.beside and test.factor == CONDITION for test in anovas):
+            page.say(
+                "Conditions are compared with the period taken out: what changes from block to "
+                "block is estimated, the same in all participants, and in no difference of them."
+            )
         for note in confounding(anovas):
             page.say(note)
         page.table("anova", found.table("anova"))

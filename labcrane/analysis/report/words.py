@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.report.factors import DISTANCE, GROUP, PHASE, Factors
 from labcrane.analysis.report.findings import Results, StudyFinding, lacking
-from labcrane.analysis.report.outcomes import questions
+from labcrane.analysis.report.outcomes import OCCASION, questions
 from labcrane.analysis.statistics.anova import Anova, Contrast
 from labcrane.analysis.statistics.trends import Trend
 
@@ -207,8 +207,13 @@ def f_test(test: Anova, style: Style, people: int) -> str:
     free = ", ".join(f"{value:.0f}" if whole else f"{value:.2f}" for value in df)
     return (
         f"{style.symbol('F')}({free}) = {test.f:.2f}, {_p(test.p_gg, style)}, "
-        f"{style.eta} = {_share(test.eta2p, 2)}{of_people(test.n, style, people)}"
+        f"{style.eta} = {_share(test.eta2p, 2)}{of_people(test.n, style, people)}{_period(test)}"
     )
+
+
+def _period(test: Anova | Contrast) -> str:
+    """Return ``, period taken out`` of a test of conditions, with blocks or occasions adjusted."""
+    return ", period taken out" if test.beside in {PHASE, OCCASION} else ""
 
 
 def verdict(test: Anova, style: Style) -> str:
@@ -303,7 +308,7 @@ def _contrast(one: Contrast, style: Style, results: Results) -> str:
         f"{first} minus {second}{at}: {difference}, "
         f"95 {style.percent} CI [{low}, {high}], {style.symbol('t')}({one.df:.0f}) = "
         f"{_number(one.t, style, '.2f')}, Holm-corrected {_p(one.p_holm, style)}"
-        f"{of_people(one.n, style, results.people)}."
+        f"{of_people(one.n, style, results.people)}{_period(one)}."
     )
 
 

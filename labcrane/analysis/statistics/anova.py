@@ -92,6 +92,8 @@ class Contrast:
         Participants.
     people
         Their names.
+    beside
+        The column that the difference was adjusted for; empty without adjustment.
     confounded
         What the difference cannot be distinguished from, in words; empty if nothing, or not tested.
     """
@@ -111,6 +113,7 @@ class Contrast:
     p_holm: float
     n: int
     people: tuple[str, ...]
+    beside: str = ""
     confounded: str = ""
 
 
@@ -160,6 +163,16 @@ class FactorialDesign:
         """Degrees of freedom of the residuals."""
         return int(self.values.shape[0] - self.model.shape[1])
 
+    @property
+    def added(self) -> FloatArray:
+        """What the adjustment takes out of the values: zero at equal shares of its levels."""
+        if not self.beside.shape[2]:
+            return np.zeros_like(self.values)
+        made = np.hstack([_contrasts(self, inside) for inside in _subsets(list(self.within))][1:])
+        adds = np.einsum("pcq,cd->pdq", self.beside, made)
+        weights = _rest(self.model, self.values @ made, adds)[2]
+        return np.asarray(self.beside @ weights)
+
 
 def design(
     table: "pd.DataFrame",
@@ -167,11 +180,18 @@ def design(
     within: Sequence[str],
     between: Sequence[str],
     beside: str = "",
+    period: str = "",
 ) -> FactorialDesign:
     """Return the cells of a design, perhaps with too few participants for a test.
 
     A participant's value in a cell is the mean over their rows there. Levels without a value, and
     factors of one level, have no cells. Who is alone in a group is left out.
+
+    Parameters
+    ----------
+    beside, period
+        A column whose levels are adjusted for: of ``beside`` each row has its share in a cell, of
+        ``period`` each level that a participant has there, so that a lost row changes no share.
     """
     known = table.dropna(subset=[measure])
     levels = _levels(known, within)
@@ -185,7 +205,8 @@ def design(
     groups = {name: tuple(sorted(who[name].unique())) for name in between}
     groups = {name: own for name, own in groups.items() if len(own) > 1}
     model, terms = _model(who, groups)
-    shares = _shares(known, beside, levels, whole.index)
+    rows = known.drop_duplicates(["participant", *levels, period]) if period else known
+    shares = _shares(rows, beside or period, levels, whole.index)
     people, single_people = (tuple(map(str, each)) for each in (whole.index, sorted(single)))
     lacking = zip(wide.columns, wide.isna().to_numpy().T, strict=True)
     empty: list[Any] = [cell for cell, lacks in lacking if len(lacks) and lacks.all()]
@@ -303,14 +324,14 @@ def effects_in(cells: FactorialDesign, measure: str, beside: str = "") -> list[A
         made = _contrasts(cells, inside)
         seen = cells.values @ made
         adds = np.einsum("pcq,cd->pdq", cells.beside, made)
-        rest, free = _rest(cells.model, seen, adds)
+        rest, free, _ = _rest(cells.model, seen, adds)
         error = rest.T @ rest
         if free < 1 or np.trace(error) <= NO_VARIANCE * float((cells.values**2).sum()):
             continue  # all are alike: nothing to compare with
         for outside, own in cells.terms.items():
             if not (inside or outside):
                 continue
-            without, more_free = _rest(np.delete(cells.model, own, axis=1), seen, adds)
+            without, more_free, _ = _rest(np.delete(cells.model, own, axis=1), seen, adds)
             if more_free - free < len(own) * len(error):
                 continue
             effect = float((without**2).sum()) - float(np.trace(error))
@@ -320,10 +341,13 @@ def effects_in(cells: FactorialDesign, measure: str, beside: str = "") -> list[A
     return found
 
 
-def _rest(model: FloatArray, seen: FloatArray, adds: FloatArray) -> tuple[FloatArray, int]:
+def _rest(
+    model: FloatArray, seen: FloatArray, adds: FloatArray
+) -> tuple[FloatArray, int, FloatArray]:
     """Return the residuals of a model between participants, adjusted, and their degrees of freedom.
 
-    The adjustment adds the same to every contrast and participant, by least squares.
+    The adjustment adds the same to every contrast and participant, by least squares; its weights
+    are the last.
     """
     people, contrasts, size = adds.shape
     outside = np.eye(people) - model @ np.linalg.pinv(model)
@@ -331,10 +355,10 @@ def _rest(model: FloatArray, seen: FloatArray, adds: FloatArray) -> tuple[FloatA
     free = (people - model.shape[1]) * contrasts
     columns = np.einsum("op,pdq->odq", outside, adds).reshape(people * contrasts, size)
     if not size:
-        return rest, free
+        return rest, free, np.empty(0)
     columns[np.abs(columns) < LEAST_SHARE] = 0.0  # shares are of 1
     weights, _, rank, _ = np.linalg.lstsq(columns, rest.ravel(), rcond=LEAST_SHARE)
-    return rest - (columns @ weights).reshape(rest.shape), free - int(rank)
+    return rest - (columns @ weights).reshape(rest.shape), free - int(rank), weights
 
 
 def _contrasts(cells: FactorialDesign, inside: tuple[str, ...]) -> FloatArray:
@@ -394,6 +418,7 @@ def compare(
     within: Sequence[str] = (),
     between: Sequence[str] = (),
     at: str = "",
+    period: str = "",
 ) -> list[Contrast]:
     """Compare the levels of one factor pairwise, corrected after Holm.
 
@@ -404,8 +429,10 @@ def compare(
     ----------
     at
         A factor within participants; the comparison is made separately at each of its levels.
+    period
+        A column whose effect is taken out of each difference, where it can be told from it.
     """
-    cells = design(table, measure, within, between)
+    cells = design(table, measure, within, between, period=period)
     if not cells.testable or factor not in {**cells.within, **cells.between}:
         return []
     places = cells.within.get(at, (None,))
@@ -417,15 +444,15 @@ def compare(
         for first, second in combinations(levels, 2):
             if factor in cells.within:
                 weights = _mean(cells, chosen | {factor: first})
-                seen = cells.values @ (weights - _mean(cells, chosen | {factor: second}))
+                weights -= _mean(cells, chosen | {factor: second})
                 asked = np.eye(cells.model.shape[1])[0]
             else:
-                seen = cells.values @ _mean(cells, chosen)
+                weights = _mean(cells, chosen)
                 asked = np.zeros(cells.model.shape[1])
                 both = _coded(np.array([first, second]), cells.between[factor])
                 asked[cells.terms[(factor,)]] = both[0] - both[1]
-            rows.append((first, second, _difference(cells, seen, asked)))
-        corrected = holm([one[-1] for _, _, one in rows])
+            rows.append((first, second, *_difference(cells, weights, asked)))
+        corrected = holm([one[-1] for _, _, one, _ in rows])
         found += [
             Contrast(
                 *(measure, factor, word(place), word(first), word(second)),
@@ -433,8 +460,9 @@ def compare(
                 p_holm,
                 len(cells.people),
                 cells.people,
+                period if adjusted else "",
             )
-            for (first, second, one), p_holm in zip(rows, corrected, strict=True)
+            for (first, second, one, adjusted), p_holm in zip(rows, corrected, strict=True)
         ]
     return found
 
@@ -442,9 +470,10 @@ def compare(
 def marginal_means(cells: FactorialDesign, columns: Sequence[str]) -> dict[tuple[Any, ...], float]:
     """Return the mean at each level of an effect: what its test compares.
 
-    Every other cell, of groups too, is weighted alike, however many people are in it.
+    Every other cell, of groups too, is weighted alike, however many people are in it, and so are
+    the levels of what is adjusted for.
     """
-    weights = np.linalg.pinv(cells.model) @ cells.values
+    weights = np.linalg.pinv(cells.model) @ (cells.values - cells.added)
     levels = [(cells.within.get(name) or cells.between[name]) for name in columns]
     found = {}
     for at in product(*levels):
@@ -473,17 +502,27 @@ def _mean(cells: FactorialDesign, chosen: dict[str, Any]) -> FloatArray:
 
 
 def _difference(
-    cells: FactorialDesign, seen: FloatArray, asked: FloatArray
-) -> tuple[float, float, float, float, float, float, float]:
+    cells: FactorialDesign, weights: FloatArray, asked: FloatArray
+) -> tuple[tuple[float, float, float, float, float, float, float], bool]:
+    """Return the estimate, its interval, error, df, t and p, and whether it is adjusted."""
     from scipy.stats import t as distribution
 
-    inverse = np.linalg.inv(cells.model.T @ cells.model)
-    weights = inverse @ cells.model.T @ seen
-    rest = seen - cells.model @ weights
-    estimate = float(asked @ weights)
-    se = float(np.sqrt((rest @ rest) / cells.free * (asked @ inverse @ asked)))
+    seen, people = cells.values @ weights, len(cells.values)
+    adds = np.einsum("pcq,c->pq", cells.beside, weights)
+    adds[np.abs(adds) < LEAST_SHARE] = 0.0
+    model = np.column_stack([cells.model, adds])
+    wanted = np.concatenate([asked, np.zeros(adds.shape[1])])
+    inverse = np.linalg.pinv(model, rcond=LEAST_SHARE)
+    free = people - int(np.linalg.matrix_rank(model, tol=LEAST_SHARE * np.linalg.norm(model)))
+    adjusted = bool(adds.any())
+    if adjusted and (free < 1 or not np.allclose(wanted @ inverse @ model, wanted)):
+        return _difference(replace(cells, beside=cells.beside[:, :, :0]), weights, asked)
+    own = wanted @ inverse
+    estimate = float(own @ seen)
+    rest = seen - model @ (inverse @ seen)
+    se = float(np.sqrt((rest @ rest) / free * (own @ own)))
     alike = rest @ rest <= NO_VARIANCE * float((cells.values**2).sum())
     t = float("nan") if alike else estimate / se
-    reach = float(distribution.ppf(0.975, cells.free)) * se
-    p = float(2.0 * distribution.sf(abs(t), cells.free))
-    return estimate, estimate - reach, estimate + reach, se, float(cells.free), t, p
+    reach = float(distribution.ppf(0.975, free)) * se
+    p = float(2.0 * distribution.sf(abs(t), free))
+    return (estimate, estimate - reach, estimate + reach, se, float(free), t, p), adjusted
