@@ -14,6 +14,7 @@ others wait for it: each would need the same time by itself.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from math import cbrt
 from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar
@@ -65,12 +66,16 @@ def part(function: F) -> F:
 def also(function: F, signature: Any = None) -> F:
     """Compile a function that Python runs as well, and those of its module that it calls.
 
-    They are compiled again when this module changes: keep what they call in it.
+    They are compiled again when this module changes: keep what they call in it. Of the cube root,
+    which numba has from numpy alone, Python's own gives the same bits as the compiled one.
     """
+    import numpy as np  # noqa: PLC0415 - loads with numba anyway
+
     known = function.__globals__
     calls = {name: known[name] for name in function.__code__.co_names if name in known}
     same = {name: each for name, each in calls.items() if isinstance(each, FunctionType)}
-    inner = {name: also(each) for name, each in same.items()}
+    inner: dict[str, Any] = {name: also(each) for name, each in same.items()}
+    inner |= {name: np.cbrt for name, each in calls.items() if each is cbrt}
     made: Any = FunctionType(function.__code__, known | inner, function.__name__)
     made.__module__, made.__qualname__ = function.__module__, function.__qualname__
     compiled: F = compile_function(made, signature)

@@ -18,6 +18,7 @@ none freezes. One scale there would follow the joint that has the least left, an
 
 import math
 from collections.abc import Sequence
+from math import cbrt
 
 import numpy as np
 
@@ -48,6 +49,9 @@ ROUNDING = 1e-16
 """Cubic weight that is lost in rounding, and whose root would overflow."""
 FLOOR2 = 1e-3
 """Square of the least damping where joints have bounds, in m²: those left may be too few."""
+CALM = 2.0
+"""Squared damping at a limit, over that at a singularity: with less, a joint that makes up for the
+one that stands still swings to and fro from tick to tick, at 60 Hz on a large machine."""
 ASTRAY = 2.0
 """How much dearer than too little speed is speed across the direction that is asked for. A larger
 weight makes the tip slower where it cannot keep the direction, and its speed change faster."""
@@ -139,7 +143,7 @@ def unshape(own: Numbers, at: int, share: float) -> float:
     if own[at + STRETCH] > 0.0:  # the one real root, after Cardano in its hyperbolic form
         x = own[at + STRETCH] * math.sinh(math.asinh(own[at + STEEPNESS] * x) / 3.0)
     elif own[at + STRAIGHT] == 0.0:
-        x = float(np.cbrt(x))
+        x = cbrt(x)
     push = own[at + EDGE] + own[at + REST] * x
     return math.copysign(push if push < 1.0 else 1.0, share)
 
@@ -220,7 +224,8 @@ def weighted(own: Numbers, at: int, angles: Numbers) -> float:
     r, z, n = base + COLUMN_R * step, base + COLUMN_Z * step, int(own[at + JOINTS])
     total = sum_r = sum_z = rr = rz = zz = 0.0
     for j in range(1, n):
-        weight = left(min(angles[j] - own[low + j], own[high + j] - angles[j]), width) ** 3
+        near = left(min(angles[j] - own[low + j], own[high + j] - angles[j]), width)
+        weight = near * near * near  # a power is not of the same bits when it is compiled
         a, b = own[r + j], own[z + j]
         total += weight
         sum_r += weight * a
@@ -233,6 +238,16 @@ def weighted(own: Numbers, at: int, angles: Numbers) -> float:
         rz -= sum_r * sum_z / total
         zz -= sum_z * sum_z / total
     return damping(own, at, rr, rz, zz)
+
+
+def least_damping(own: Numbers, at: int, angles: Numbers) -> float:
+    """Return the square of the least damping, in m², where joints have bounds."""
+    base, step = at + TABLES, int(own[at + STRIDE])
+    low, high, remains = base + LOW * step, base + HIGH * step, 1.0
+    for j in range(1, int(own[at + JOINTS])):
+        room = min(angles[j] - own[low + j], own[high + j] - angles[j])
+        remains = min(remains, left(room, own[at + WIDTH]))
+    return max(FLOOR2, CALM * own[at + DAMPING2] * (1.0 - remains))
 
 
 def least_squares(own: Numbers, at: int, damping2: float, radial: float, vertical: float) -> float:
@@ -345,7 +360,8 @@ def solve(
         own[bound + j], own[factors + j] = 0.0, 1.0
     far = free(own, at, angles)
     near = -1.0 if far else weighted(own, at, angles)
-    damping2 = least_squares(own, at, near if far else max(near, FLOOR2), radial, vertical)
+    floor = least_damping(own, at, angles)
+    damping2 = least_squares(own, at, near if far else max(near, floor), radial, vertical)
     damping2 = damping2 if far else near
     regular = far and damping2 == over_axis == 0.0
     scale = 1.0
@@ -368,7 +384,7 @@ def solve(
         for j in range(1, n):
             r, z = own[column_r + j], own[column_z + j]
             own[column_r + j], own[column_z + j] = cos * r + sin * z, ASTRAY * (cos * z - sin * r)
-    bounded(own, at, max(damping2, FLOOR2), scale * asked, 0.0)
+    bounded(own, at, max(damping2, floor), scale * asked, 0.0)
     put_factors(own, at, angles)
     return scale
 
