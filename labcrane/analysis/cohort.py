@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.errors import ProtocolError, RecordingError, StorageError
 from labcrane.files.yaml import parse_yaml
-from labcrane.recording.data_folder import DataFolder
+from labcrane.recording.data_folder import DataFolder, recorded
 from labcrane.recording.participant_file.reader import Recording, SessionRecord
 from labcrane.recording.participant_file.recover import backlog
 from labcrane.recording.paths import nearby_file, participant_path
@@ -158,6 +158,7 @@ def find_cohort(
     folder: Path,
     include: Iterable[str] = (),
     struck: Mapping[str, Struck] | None = None,
+    unregistered: Mapping[str, str] | None = None,
 ) -> Cohort:
     """Find every participant below ``folder``.
 
@@ -172,6 +173,9 @@ def find_cohort(
         Statuses to be used as well: simulated, pilot, half-finished.
     struck
         Participants whom the register excludes, and why, by name: they are listed, never used.
+    unregistered
+        What is missing of participants who are not in the register, by name: it is added to why
+        they are used or left out.
 
     Raises
     ------
@@ -181,7 +185,7 @@ def find_cohort(
         There is no such folder, it has no usable participant, or participants of two studies.
     """
     wanted = {Status.COMPLETE, *(_includable(word) for word in include)}
-    people = everyone(folder, struck)
+    people = everyone(folder, struck, unregistered)
     included = tuple(person for person in people if person.needs <= wanted)
     left_out = tuple(person for person in people if not person.needs <= wanted)
     if not included:
@@ -195,8 +199,17 @@ def find_cohort(
     return Cohort(folder, included, left_out)
 
 
-def everyone(folder: Path, struck: Mapping[str, Struck] | None = None) -> list[Participant]:
+def everyone(
+    folder: Path,
+    struck: Mapping[str, Struck] | None = None,
+    unregistered: Mapping[str, str] | None = None,
+) -> list[Participant]:
     """Return all who have data below ``folder`` or were struck, sorted by name.
+
+    Parameters
+    ----------
+    struck, unregistered
+        As in :func:`find_cohort`.
 
     Raises
     ------
@@ -209,10 +222,16 @@ def everyone(folder: Path, struck: Mapping[str, Struck] | None = None) -> list[P
         raise RecordingError(
             f"there is no data folder {folder}; give the study's data folder{where}"
         )
-    folders = [entry for entry in sorted(folder.iterdir()) if _is_participant(entry)]
+    folders = recorded(folder)
     struck = struck or {}
     gone = [name for name in struck if not any(entry.name == name for entry in folders)]
     people = [_look(entry, struck.get(entry.name)) for entry in folders]
+    people = [
+        replace(person, why=f"{person.why}; {unregistered[person.name]}")
+        if unregistered and person.name in unregistered
+        else person
+        for person in people
+    ]
     people += [Participant(name, participant_path(folder / name), *struck[name]) for name in gone]
     return sorted(people, key=lambda person: person.name)
 
@@ -246,12 +265,6 @@ def _nobody(folder: Path, left_out: Sequence[Participant]) -> str:
     if asked:
         remedies.append(f"to use them as well: {' '.join(asked)}")
     return "; ".join([f"no usable participant in {folder}: {found}", *remedies])
-
-
-def _is_participant(entry: Path) -> bool:
-    if not entry.is_dir():
-        return False
-    return participant_path(entry).exists() or any(entry.glob("ses-*.xdf"))
 
 
 def _look(folder: Path, struck: Struck | None) -> Participant:

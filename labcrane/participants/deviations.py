@@ -1,13 +1,16 @@
 """Deviations from the protocol, from the events of a session."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from labcrane.errors import RecordingError
 from labcrane.participants.folders import Places
-from labcrane.participants.register import Deviation, Entry, changed, read
+from labcrane.participants.register import Deviation, Entry, changed, read, unregistered
+from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.journal_reader import LoggedEvent, read_journal
-from labcrane.recording.paths import journal_path, parts
+from labcrane.recording.participant_file.reader import Recording
+from labcrane.recording.paths import journal_path, participant_path, parts
 
 ORDERS = {
     "order.skip": "skipped",
@@ -57,8 +60,12 @@ def of_journals(folder: Path, session: int) -> list[Deviation]:
     if not found:
         return []
     log, _ = read_journal(found)
-    deviations = of_events(session, log.events)
-    if not any(event.name == "session.end" for event in log.events):
+    return _of_session(session, log.events)
+
+
+def _of_session(session: int, events: Sequence[LoggedEvent]) -> list[Deviation]:
+    deviations = of_events(session, events)
+    if not any(event.name == "session.end" for event in events):
         deviations.append(
             Deviation(what="session cut off", session=session, detail="the program was stopped")
         )
@@ -82,15 +89,57 @@ def settle(places: Places, participant: str, session: int) -> None:
 
 
 def all_deviations(places: Places) -> list[tuple[str, Deviation]]:
-    """Return every participant's deviations; those of killed sessions from their journals."""
-    return [
+    """Return every participant's deviations.
+
+    Those of killed sessions, and of participants and sessions that are not in the register, are
+    read from the recordings. That they are not in the register is a deviation itself.
+    """
+    found = [
         (name, deviation)
-        for name, entry in sorted(read(places).participants.items())
-        for deviation in (*entry.deviations, *_of_sessions(places.raw(name), entry))
+        for name, entry in read(places).participants.items()
+        for deviation in (*entry.deviations, *_of_sessions(places, name, entry))
     ]
+    for name, why in unregistered(places).items():
+        title, _, detail = why.partition(": ")
+        found.append((name, Deviation(what=title, detail=detail)))
+        found += [
+            (name, deviation)
+            for session in _recorded(places, name)
+            for deviation in _read(places.raw(name), session)
+        ]
+    return sorted(found, key=lambda each: each[0])
 
 
-def _of_sessions(folder: Path, entry: Entry) -> Iterable[Deviation]:
-    for sitting in sorted(entry.sessions, key=lambda sitting: sitting.session):
-        recorded = sitting.deviations
-        yield from of_journals(folder, sitting.session) if recorded is None else recorded
+def _of_sessions(places: Places, name: str, entry: Entry) -> Iterable[Deviation]:
+    sittings = {sitting.session: sitting.deviations for sitting in entry.sessions}
+    for session in sorted({*sittings, *_recorded(places, name)}):
+        if session not in sittings:
+            yield Deviation(what="session not in the register", session=session)
+            yield from _read(places.raw(name), session)
+        elif (settled := sittings[session]) is None:
+            yield from of_journals(places.raw(name), session)
+        else:
+            yield from settled
+
+
+def _recorded(places: Places, name: str) -> list[int]:
+    """Return the sessions of which there is a journal, or data in the participant file."""
+    folder = DataFolder(places.root, name, pilot=False, simulated=False)
+    path = folder.participant_file
+    try:
+        in_file = Recording(path).sessions if path.is_file() else ()
+    except RecordingError:  # its journals may be readable
+        in_file = ()
+    return sorted({*folder.sessions(), *in_file})
+
+
+def _read(folder: Path, session: int) -> list[Deviation]:
+    """Return the deviations in a recording that was copied here; without journals, in its file."""
+    try:
+        if parts(journal_path(folder, session, "run")):
+            return of_journals(folder, session)
+        table = Recording(participant_path(folder)).session(session).events
+    except RecordingError as error:
+        return [Deviation(what="recording cannot be read", session=session, detail=str(error))]
+    columns = table[["name", "time", "tick", "part", "data"]]
+    return _of_session(session, [LoggedEvent(*row) for row in columns.itertuples(index=False)])

@@ -15,6 +15,7 @@ from labcrane.errors import ProtocolError, RecordingError
 from labcrane.files.atomic import write_text
 from labcrane.files.lock import exclusive
 from labcrane.participants.folders import Places
+from labcrane.recording.data_folder import DataFolder, recorded
 
 if TYPE_CHECKING:
     from labcrane.analysis.cohort import Struck
@@ -242,6 +243,23 @@ def read(places: Places) -> Register:
             both = f"{holders[entry.slot]} and {name} both have slot {entry.slot}"
             raise RecordingError(_damaged(places, both))
     return register
+
+
+UNREGISTERED = (
+    "not in the register: consent, slot, notes and exclusion are unknown here; they are in the "
+    "register of the data folder from which the recordings were copied"
+)
+
+
+def unregistered(places: Places) -> dict[str, str]:
+    """Return whose recordings are in the data folder but not in its register, and what that means.
+
+    Pilots and simulations are in no register.
+    """
+    known = read(places).names()
+    folders = recorded(places.root) if places.root.is_dir() else []
+    names = [each.name for each in folders if DataFolder.pseudonym(each.name) == each.name]
+    return {name: UNREGISTERED for name in names if name not in known}
 
 
 def struck(places: Places) -> "dict[str, Struck]":

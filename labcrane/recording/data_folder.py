@@ -17,6 +17,17 @@ def needed_bytes(expected_s: float, bytes_per_s: float, reserve_s: float) -> flo
     return (2.0 * expected_s + reserve_s) * bytes_per_s
 
 
+def recorded(root: Path) -> list[Path]:
+    """Return the folders below ``root`` with recordings, pilots and simulations too, by name."""
+    return [folder for folder in sorted(root.iterdir()) if _is_recorded(folder)]
+
+
+def _is_recorded(folder: Path) -> bool:
+    if not folder.is_dir():
+        return False
+    return participant_path(folder).exists() or any(folder.glob("ses-*.xdf"))
+
+
 @dataclass(frozen=True, slots=True)
 class DataFolder:
     """The recordings of one participant.

@@ -2,12 +2,15 @@
 
 import json
 import os
+import re
+import shutil
 import signal
 import stat
 from datetime import date, timedelta
 from pathlib import Path
 
 import pytest
+from governance.kept_people import lab_in
 from governed import GOVERNED, GROUPED, PERSON, TODAY, Lab, Willing
 from needs import needs
 
@@ -292,3 +295,74 @@ def test_people_need_joysticks_and_leave_no_session_when_there_are_none(tmp_path
         run(lab.visit("P001"), Willing())
     assert all_deviations(lab.places) == []
     assert date.fromisoformat(read(lab.places).participants["P001"].enrolled) == TODAY
+
+
+def _copied_by_hand(lab: Lab, folder: Path, keep: str) -> Lab:
+    """Return the study's folder elsewhere, with the recordings but without the register."""
+    shutil.copytree(lab.folder, folder, ignore=shutil.ignore_patterns("register"))
+    other = lab_in(folder)
+    for path in other.places.raw("P001").iterdir():
+        if not path.match(keep):
+            path.unlink()
+    return other
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("keep", ["*", "*.xdf", "P001.h5"])
+def test_recordings_that_were_copied_without_the_register_give_the_same_deviations(
+    lab: Lab, tmp_path: Path, keep: str
+) -> None:
+    lab.run(
+        "P001", {40: [Command(Order.SKIP)], 60: [Command(Order.REPEAT)], 90: [Command(Order.END)]}
+    )
+    run(lab.visit("P001", fast=True, resumed=True), Willing())
+    known = [(d.what, d.session, d.trial, d.detail) for _, d in all_deviations(lab.places)]
+    assert {"skipped", "trial repeated", "restarted"} <= {what for what, *_ in known}
+    copied = _copied_by_hand(lab, tmp_path / "elsewhere", keep)
+    found = [(d.what, d.session, d.trial, d.detail) for _, d in all_deviations(copied.places)]
+    assert found[0][0] == "not in the register"
+    assert found[1:] == known
+    copied.consent("P001")
+    found = [(d.what, d.session, d.trial, d.detail) for _, d in all_deviations(copied.places)]
+    assert found[0] == ("session not in the register", 1, 0, "")
+    assert found[1:] == known
+
+
+@pytest.mark.slow
+def test_a_recording_that_is_not_in_the_register_is_named_by_every_command(
+    lab: Lab, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lab.run("P001")
+    copied = _copied_by_hand(lab, tmp_path / "elsewhere", "*")
+    copied.consent("P002")
+    (copied.places.root / "P003-PILOT").mkdir()
+    (copied.places.root / "P003-PILOT" / "ses-01_run.xdf").write_bytes(b"")
+    tables, page = tmp_path / "tables", tmp_path / "page"
+    for words in (
+        ("participants",),
+        ("deviations",),
+        ("export", "--to", "tables", "--out", str(tables)),
+        ("report", "--out", str(page)),
+    ):
+        assert main([words[0], str(copied.folder), *words[1:]]) in {0, 3}
+        said = " ".join(capsys.readouterr().out.replace("│", " ").split())
+        assert re.search("P001[^P]*not in the register", said), words
+        assert not re.search("P00[23]-?P?[^P]*not in the register", said), words
+    for path in (next(page.glob("*.html")), tables / "participants.csv"):
+        assert "not in the register" in path.read_text(encoding="utf-8")
+
+
+def test_a_damaged_recording_that_is_not_in_the_register_does_not_hide_the_others(
+    lab: Lab,
+) -> None:
+    for name in ("P008", "P009"):
+        folder = lab.places.raw(name)
+        folder.mkdir(parents=True)
+        (folder / f"{name}.h5").write_bytes(b"not HDF5")
+        (folder / "ses-02_run.xdf").write_bytes(b"not XDF")
+    found = [(name, d.what, d.session) for name, d in all_deviations(lab.places)]
+    assert found == [
+        (name, what, session)
+        for name in ("P008", "P009")
+        for what, session in (("not in the register", 0), ("recording cannot be read", 2))
+    ]

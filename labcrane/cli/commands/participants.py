@@ -31,7 +31,7 @@ Reason = Annotated[str, typer.Option(help="why; no names")]
 def participants(study: StudyOrHere = None, data: DataOrHere = None) -> None:
     """Show the register: slots, sessions and how they ended, consent, exclusions."""
     from labcrane.participants.folders import Places
-    from labcrane.participants.register import read
+    from labcrane.participants.register import read, unregistered
 
     places = Places(one_study(data, study))
     register = read(places)
@@ -63,6 +63,8 @@ def participants(study: StudyOrHere = None, data: DataOrHere = None) -> None:
     for name, entry in sorted(register.participants.items()):
         for text in entry.notes:
             out.print(f"{name}: {text}", markup=False)
+    for name, why in unregistered(places).items():
+        out.print(f"{name}: {why}", markup=False)
     for stone in register.tombstones:
         out.print(f"{stone.participant} erased on {stone.date}: {stone.reason}", markup=False)
     for export in register.exports:

@@ -378,11 +378,16 @@ def cohort_of(data: Path, include: list[str] | None) -> "Cohort":
     """Return the included participants of a data folder, and print the others with reasons."""
     from labcrane.analysis.cohort import find_cohort
     from labcrane.participants.folders import Places
-    from labcrane.participants.register import struck
+    from labcrane.participants.register import struck, unregistered
 
-    cohort = find_cohort(data, include or (), struck=struck(Places(data)))
+    places = Places(data)
+    strangers = unregistered(places)
+    cohort = find_cohort(data, include or (), struck=struck(places), unregistered=strangers)
     for person in cohort.left_out:
         out.print(f"left out: {person.name}, {person.status}: {person.why}", markup=False)
+    for person in cohort.included:
+        if person.name in strangers:
+            out.print(f"used: {person.name}, {strangers[person.name]}", markup=False)
     return cohort
 
 

@@ -18,7 +18,7 @@ from labcrane.files.study_folder import data_of, protocol_of
 from labcrane.files.yaml import parse_yaml
 from labcrane.participants.deviations import all_deviations
 from labcrane.participants.folders import Places
-from labcrane.participants.register import Deviation, Entry, Register, read, struck
+from labcrane.participants.register import Deviation, Entry, Register, read, struck, unregistered
 from labcrane.participants.session_windows import days_of
 from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.participant_file.reader import SessionRecord
@@ -206,7 +206,9 @@ class Reader:
         """
         places = Places(self.data)
         register = read(places)
-        recorded = everyone(self.data, struck(places)) if self.data.is_dir() else []
+        recorded = (
+            everyone(self.data, struck(places), unregistered(places)) if self.data.is_dir() else []
+        )
         text = self._text(recorded)
         planned = _planned(text)
         version = self._consent_version()
