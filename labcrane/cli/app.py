@@ -40,7 +40,7 @@ MODULES = {
     "participants": (
         "participants", "study", "consent", "exclude", "note", "waive", "deviations",
     ),
-    "data": ("where", "erase", "relabel", "transfer"),
+    "data": ("where", "erase", "relabel", "transfer", "merge"),
 }  # fmt: skip
 """The module of each command, and its functions."""
 

@@ -16,7 +16,7 @@ SECTIONS = {
     "Analyse": ("view", "report", "score", "export", "replay", "compare-engines"),
     "Manage participants and data": (
         "study", "participants", "where", "note", "exclude", "waive", "deviations", "recover",
-        "resync", "erase", "relabel", "transfer",
+        "resync", "erase", "relabel", "transfer", "merge",
     ),
 }  # fmt: skip
 """Commands by purpose, in the order of a study."""

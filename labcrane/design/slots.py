@@ -36,9 +36,12 @@ def place_of(groups: Sequence[str], slot: int) -> int:
 def next_slot(study: str, groups: Sequence[str], taken: Collection[int]) -> int:
     """Return the slot of the next participant: a free one, of the smallest group, the first such.
 
-    Slots are handed out in order, so free ones among them were released.
+    Slots are handed out in order, so free ones among them were released. A slot that several
+    laboratories handed out is in ``taken`` as often.
     """
     last = max(taken, default=0)
-    free = [slot for slot in range(1, last + 1) if slot not in taken] or [last + 1]
+    free = [slot for slot in range(1, last + 1) if slot not in taken]
+    if not free:  # one of each group: after a merge, the next one may not be of the smallest
+        free = list(range(last + 1, last + 1 + max(1, len(groups))))
     sizes = Counter(group_of(study, groups, slot) for slot in taken)
     return min(free, key=lambda slot: (sizes[group_of(study, groups, slot)], slot))

@@ -1,4 +1,4 @@
-"""The participants: register, consent, deviations, erasure, relabelling, transfer.
+"""The participants: register, consent, deviations, erasure, relabelling, transfer, merge.
 
 In come pseudonyms, never names; out go entries that outlive a crash, and proof of what was erased.
 """

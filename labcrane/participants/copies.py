@@ -1,4 +1,4 @@
-"""Copies of participants' data: what labcrane wrote of them, and the lab's store."""
+"""Copies of participants' data: what labcrane wrote of them, the lab's store, and a list of all."""
 
 import csv
 import gzip
@@ -15,7 +15,7 @@ from labcrane.files.atomic import UNFINISHED, replacing, write_text
 from labcrane.participants.folders import Places
 from labcrane.participants.mentions import Mentions
 from labcrane.participants.proof import mentioned
-from labcrane.participants.register import Export, OwedRemoval, Register
+from labcrane.participants.register import Export, OwedRemoval, Register, read
 
 TABLES = {".csv": ",", ".tsv": "\t"}
 """Files from which single rows can be removed, and the separators of their cells."""
@@ -414,3 +414,72 @@ def write_manifest(folder: Path, content: Mapping[str, Any]) -> None:
     """Describe an export in a file next to it; BIDS and Psych-DS ignore hidden folders."""
     text = json.dumps(content, indent=2, ensure_ascii=False) + "\n"
     write_text(folder / MANIFEST, text)
+
+
+HERE, AWAY, DUE = "there", "cannot be reached now", "due: to be erased or relabelled"
+
+
+@dataclass(frozen=True, slots=True)
+class InventoryEntry:
+    """One place.
+
+    Attributes
+    ----------
+    what
+        ``recordings``, ``register``, ``store``, or what wrote it: an exporter, a command.
+    where
+        Folder or file.
+    state
+        Whether it can be reached, or is still to be erased.
+    """
+
+    what: str
+    where: str
+    state: str
+
+
+def inventory(places: Places, participant: str) -> list[InventoryEntry]:
+    """Return every place with data of a participant, by exact name."""
+    register = read(places)
+    found = [
+        InventoryEntry("recordings", str(folder), HERE) for folder in places.all_raw(participant)
+    ]
+    found += [
+        InventoryEntry("recordings", str(link), "a link, which is never followed")
+        for link in places.links(participant)
+    ]
+    if participant in register.participants:
+        found.append(InventoryEntry("register", str(places.register), HERE))
+    if any(stone.participant == participant for stone in register.tombstones):
+        found.append(InventoryEntry("register", str(places.register), "erasure record: was erased"))
+    for export in register.exports:
+        if not concerns(export, participant):
+            continue
+        folder = places.root / export.folder
+        there = reachable(places, export.folder, traces(export), ())
+        state = HERE if there else AWAY
+        if export.staging:
+            found.append(
+                InventoryEntry(export.exporter, str(places.root / export.staging), "not finished")
+            )
+        found += [
+            InventoryEntry(export.exporter, str(folder / name), state)
+            for name, people in sorted(export.files.items())
+            if participant in people
+        ]
+    found += [
+        InventoryEntry("merged from", each.folder, "not reached from here: erase or relabel there")
+        for each in register.merges
+        if participant in each.participants
+    ]
+    for store, files in register.stores.items():
+        if any(name.split("/")[0] == participant for name in files):
+            state = HERE if store_reachable(store, register.study, files, ()) else AWAY
+            place = in_store(Path(store), register.study, participant)
+            found.append(InventoryEntry("store", str(place), state))
+    found += [
+        InventoryEntry("owed", owed.folder, DUE)
+        for owed in register.owed
+        if owed.participant == participant
+    ]
+    return found

@@ -4,10 +4,11 @@ from datetime import date
 from pathlib import Path
 
 from labcrane.files.lock import exclusive
-from labcrane.participants import erasure, relabel, transfer
+from labcrane.participants import erasure, merge, relabel, transfer
 from labcrane.participants.copies import Reach
 from labcrane.participants.erasure import Erased
 from labcrane.participants.folders import Places
+from labcrane.participants.merge import Merged
 from labcrane.participants.register import Work, read
 from labcrane.participants.transfer import Transferred
 
@@ -44,6 +45,13 @@ def move(places: Places, store: Path) -> Transferred:
     with exclusive(places.work_lock):
         _finish(places)
         return transfer.transfer(places, store)
+
+
+def join(places: Places, other: Places, today: date, known: frozenset[str] | None) -> Merged:
+    """Take recordings and register of another data folder of the study."""
+    with exclusive(places.work_lock):
+        _finish(places)
+        return merge.merge(places, other, today, known)
 
 
 def _finish(places: Places) -> tuple[Work | None, Erased | Reach | None]:

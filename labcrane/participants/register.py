@@ -151,6 +151,17 @@ class Work(Record):
     """Folders outside of the data folder that were there when it began."""
 
 
+class Merge(Record):
+    """Another data folder of the study whose register was entered into this one."""
+
+    date: str
+    folder: str
+    """Where it was."""
+    register_sha256: str
+    participants: list[str]
+    """Everyone who was in its register."""
+
+
 class Register(Record):
     """Everything that is kept about the participants of one study."""
 
@@ -165,6 +176,9 @@ class Register(Record):
     """The lab's stores, and the SHA-256 of every file that labcrane has put there."""
     tombstones: list[Tombstone] = Field(default_factory=list)
     owed: list[OwedRemoval] = Field(default_factory=list)
+    merges: list[Merge] = Field(default_factory=list)
+    shared_slots: list[int] = Field(default_factory=list)
+    """Slots that laboratories had handed out before their registers were merged."""
     work: Work | None = None
 
     @property
@@ -211,9 +225,17 @@ class Register(Record):
         pending = [self.work.participant] if self.work else []
         return sorted({*self.participants, *erased, *pending})
 
-    def slots(self) -> dict[int, str]:
-        """Return who holds which slot."""
-        return {entry.slot: name for name, entry in self.participants.items() if entry.holds_slot}
+    def holders(self) -> dict[int, list[str]]:
+        """Return who holds which slot: one participant, or several after a merge."""
+        found: dict[int, list[str]] = {}
+        for name, entry in self.participants.items():
+            if entry.holds_slot:
+                found.setdefault(entry.slot, []).append(name)
+        return found
+
+    def slots(self) -> list[int]:
+        """Return the slots that are held, each as often as it is."""
+        return [slot for slot, names in self.holders().items() for _ in names]
 
 
 def read(places: Places) -> Register:
@@ -237,17 +259,16 @@ def read(places: Places) -> Register:
         raise RecordingError(_damaged(places, f"{where}: {first['msg']}")) from error
     except ValueError as error:
         raise RecordingError(_damaged(places, str(error))) from error
-    holders: dict[int, str] = {}
-    for name, entry in register.participants.items():
-        if entry.holds_slot and holders.setdefault(entry.slot, name) != name:
-            both = f"{holders[entry.slot]} and {name} both have slot {entry.slot}"
+    for slot, names in register.holders().items():
+        if len(names) > 1 and slot not in register.shared_slots:
+            both = f"{' and '.join(names)} both have slot {slot}"
             raise RecordingError(_damaged(places, both))
     return register
 
 
 UNREGISTERED = (
-    "not in the register: consent, slot, notes and exclusion are unknown here; they are in the "
-    "register of the data folder from which the recordings were copied"
+    "not in the register: consent, slot, notes and exclusion are unknown here; labcrane merge "
+    "takes them from the data folder in which the recordings were made"
 )
 
 

@@ -128,6 +128,21 @@ def test_after_many_drop_out_at_once_the_smallest_group_is_filled_first() -> Non
         taken.add(slot)
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_after_laboratories_were_merged_the_smallest_group_is_filled_first(seed: int) -> None:
+    chance = random.Random(seed)
+    groups = tuple("abcde"[: chance.randint(1, 5)])
+    taken = [slot for _ in range(3) for slot in range(1, 1 + chance.randint(0, 14))]
+    for _ in range(20):
+        sizes = Counter(dict.fromkeys(groups, 0))
+        sizes.update(group_of("study", groups, slot) for slot in taken)
+        holes = set(range(1, max(taken, default=0))) - set(taken)
+        slot = next_slot("study", groups, taken)
+        assert slot not in taken
+        assert slot in holes or sizes[group_of("study", groups, slot)] == min(sizes.values())
+        taken.append(slot)
+
+
 def test_long_sequences_are_drawn_without_a_call_for_every_trial() -> None:
     order = sequence(("a", "b"), 300, 2, 3)
     assert Counter(order) == {"a": 300, "b": 300}

@@ -27,7 +27,7 @@ from needs import GRAPHICS, missing, needs
 from labcrane.analysis import Exporter
 from labcrane.cli.app import COMPLETING, commands, main
 from labcrane.participants import recovery
-from labcrane.participants.inventory import inventory
+from labcrane.participants.copies import inventory
 from labcrane.participants.register import read
 from labcrane.registry.registry import discover
 

@@ -20,10 +20,10 @@ from rehearsal import SHORT, a_study
 from labcrane import ProtocolError, RecordingError
 from labcrane.files.names import DEVICES, LONGEST, OURS, check_name, file_name_of, misfit, twin_key
 from labcrane.participants import recovery
+from labcrane.participants.copies import inventory
 from labcrane.participants.enrolment import check_apart
 from labcrane.participants.erasure import mentions
 from labcrane.participants.folders import Places, keep_private
-from labcrane.participants.inventory import inventory
 from labcrane.participants.mentions import Mentions
 from labcrane.participants.register import Entry, Register, read
 

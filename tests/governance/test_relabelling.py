@@ -11,8 +11,8 @@ from governed import TODAY, Lab
 import labcrane
 from labcrane import ProtocolError
 from labcrane.participants import recovery as unfinished
+from labcrane.participants.copies import inventory
 from labcrane.participants.deviations import all_deviations
-from labcrane.participants.inventory import inventory
 from labcrane.participants.register import read
 from labcrane.recording.annotations import annotate
 from labcrane.recording.journal_reader import read_journal

@@ -1,4 +1,4 @@
-"""Commands about participants' data: erase, relabel, transfer."""
+"""Commands about participants' data: erase, relabel, transfer, merge."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,19 +11,19 @@ from labcrane.cli.options import DataOrHere, StudyFirst, data_in, first_study, o
 from labcrane.cli.output import out
 from labcrane.cli.typed import from_terminal
 from labcrane.errors import ProtocolError
+from labcrane.files.study_folder import data_of, protocol_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from labcrane.participants.copies import Reach
+    from labcrane.participants.copies import InventoryEntry, Reach
     from labcrane.participants.folders import Places
-    from labcrane.participants.inventory import InventoryEntry
 
 
 def where(study: StudyFirst, participant: Someone, data: DataOrHere = None) -> None:
     """List every place that holds a participant's data."""
+    from labcrane.participants.copies import inventory
     from labcrane.participants.folders import Places
-    from labcrane.participants.inventory import inventory
     from labcrane.recording.data_folder import DataFolder
 
     places = Places(one_study(data, data_in(first_study(study))))
@@ -60,7 +60,7 @@ def erase(
 
 def _confirm_erasure(places: "Places", participant: str) -> None:
     """List what will be erased, and require the pseudonym as confirmation."""
-    from labcrane.participants.inventory import inventory
+    from labcrane.participants.copies import inventory
 
     found = inventory(places, participant)
     if not found:  # which erasing refuses
@@ -121,6 +121,51 @@ def transfer(
     )
     for line in done.only_here:
         out.print(f"only here: {line}", markup=False)
+
+
+def merge(
+    study: StudyFirst,
+    other: Annotated[Path, typer.Argument(help="the other laboratory's study, or its data folder")],
+    data: DataOrHere = None,
+) -> None:
+    """Take recordings and register of another laboratory's data folder of the same study."""
+    from labcrane.participants import recovery as unfinished
+    from labcrane.participants.folders import Places
+
+    given = first_study(study)
+    places, there = Places(one_study(data, data_in(given))), Places(data_of(other))
+    done = unfinished.join(places, there, today(), _seals(given or places.root))
+    for what, names in (
+        ("taken from there", done.taken),
+        ("here already, equal", done.equal),
+        ("only there, since pilots and simulations are not taken", done.only_there),
+    ):
+        if names:
+            out.print(f"{what}: {', '.join(names)}", markup=False)
+    if not done.taken:
+        out.print(f"nothing new in the register of {there.root}", markup=False)
+    for slot, holders in done.shared.items():
+        out.print(
+            f"slot {slot}: {' and '.join(holders)} keep it, with the group and rows under which "
+            "they are run",
+            markup=False,
+        )
+    if done.taken:
+        out.print(f"{there.root} is unchanged; erase and relabel do not reach it", markup=False)
+
+
+def _seals(study: Path) -> frozenset[str] | None:
+    """Return the seals of a study's lock and of those that it replaced; None without a lock."""
+    from labcrane.approval.lock import lock_path, read_lock
+
+    try:
+        protocol = protocol_of(study)
+    except ProtocolError:  # data alone
+        return None
+    if not lock_path(protocol).is_file():
+        return None
+    lock = read_lock(protocol)
+    return lock.replaced | {lock.seal}
 
 
 def _say(reach: "Reach") -> None:
