@@ -335,3 +335,26 @@ def test_a_merge_that_is_killed_before_any_of_its_writes_loses_nothing_and_is_co
             break
         number += 1
     assert number > 20
+
+
+def test_laboratories_are_merged_into_a_copy_of_the_study_without_data_as_often_as_wanted(
+    sites: dict[str, Lab], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for day in ("monday", "tuesday"):
+        together = tmp_path / day
+        shutil.copytree(sites["aachen"].folder, together, ignore=shutil.ignore_patterns("data"))
+        for lab in sites.values():
+            assert main(["merge", str(together), str(lab.folder)]) == 0
+        people = read(lab_in(together).places).participants
+        assert people == {
+            name: entry
+            for lab in sites.values()
+            for name, entry in read(lab.places).participants.items()
+        }
+        sites["aachen"].consent("P399")  # the laboratories go on
+        enrolment.note(sites["dortmund"].places, "P201", "left-handed")
+    capsys.readouterr()
+    assert main(["erase", str(together), "P201", "--reason", "withdrew", "--yes"]) == 0
+    assert not (together / "data" / "P201").exists()
+    assert main(["where", str(together), "P201"]) == 0
+    assert "merged from" in capsys.readouterr().out
