@@ -7,10 +7,14 @@ two sticks. A control panel's valve that extends lifts.
 
 from collections.abc import Mapping
 
+from labcrane.machines.kinematics import jacobian, link_frames
 from labcrane.machines.machine import Machine
 
 STICKS = ("left.x", "left.y", "right.x", "right.y")
 """Axes of two sticks: x is positive to the right, y towards the operator."""
+
+NEAR_M = 1e-9
+"""So near to the slew axis the tip is in no direction from it."""
 
 VALVE = "valve."
 """Axes of a control panel, one for each joint; positive signals extend."""
@@ -115,7 +119,13 @@ def _joint_goes(machine: Machine, joint: str, sign: float) -> str:
         return f"{joint} turns {WAYS['y'][sign < 0.0]}"
     if joint == machine.joints[-1].name and not machine.joints[-1].a:
         return f"{joint} turns to {'larger' if sign > 0.0 else 'smaller'} angles"
-    return f"{joint} goes {WAYS['z'][sign > 0.0]}"  # positive pitch is down
+    import numpy as np  # noqa: PLC0415 - with NumPy, which few protocols need to be checked
+
+    moved = sign * jacobian(machine, machine.rest)[:, machine.names.index(joint)]
+    tip = link_frames(machine, machine.rest)[-1][:2, 3]
+    outward, upward = float(moved[:2] @ tip / max(np.linalg.norm(tip), NEAR_M)), float(moved[2])
+    way, far = ("z", upward) if abs(upward) >= abs(outward) else ("x", outward)
+    return f"{joint} moves the tip {WAYS[way][far < 0.0]} from rest"
 
 
 def _tip_goes(way: str, sign: float) -> str:

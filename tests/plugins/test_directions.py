@@ -146,6 +146,9 @@ MOVES = {
     "goes to the left": (1, 1.0), "goes to the right": (1, -1.0),
     "goes away from you": (0, 1.0), "goes towards you": (0, -1.0),
     "goes up": (2, 1.0), "goes down": (2, -1.0),
+    "moves the tip up from rest": (2, 1.0), "moves the tip down from rest": (2, -1.0),
+    "moves the tip away from you from rest": (0, 1.0),
+    "moves the tip towards you from rest": (0, -1.0),
 }  # fmt: skip
 """Along which axis of the base frame the tip goes, and which way, of an arm straight ahead."""
 
@@ -172,10 +175,12 @@ def test_the_machine_goes_where_the_words_of_its_map_say(name: str, seed: int) -
         for sentence, moved in zip(said, settings.map, strict=True):
             pushed, goes = sentence.split(": ")
             along, sign = MOVES[goes.removeprefix(f"the {moved} ").removeprefix("the tip ")]
-            state = LOW[name]
+            state = np.array(machine.rest) if controller is JointVelocity else LOW[name]
             speeds = scheme.command(push(**{PUSHES[pushed]: 0.8}), state)[: len(machine.names)]
             velocity = jacobian(machine, state) @ speeds
             assert sign * velocity[along] > 0.01, sentence
+            if "moves" in goes:
+                assert abs(velocity[along]) == max(abs(velocity)), "it goes no other way by more"
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -194,8 +199,8 @@ def test_the_machine_goes_where_the_words_of_its_valves_say(name: str, seed: int
         along, sign = MOVES[goes.removeprefix(f"the {joint} ")]
         pushed = np.zeros(run.axes.size)
         pushed[run.axes.index(f"valve.{joint}")] = 0.8
-        speeds = scheme.command(pushed, LOW[name])[: len(machine.names)]
-        assert sign * (jacobian(machine, LOW[name]) @ speeds)[along] > 0.01, sentence
+        speeds = scheme.command(pushed, np.array(machine.rest))[: len(machine.names)]
+        assert sign * (jacobian(machine, machine.rest) @ speeds)[along] > 0.01, sentence
     first = machine.joints[1].name
     assert ("map" in settings.doubts(machine)) == (first not in turned)
 
@@ -216,8 +221,10 @@ BOTH = (
 )
 ROUND = {
     "slew: -left.x": "turns to the left when the left stick is moved to the right",
-    "wrist: -right.x": "wrist goes down when the right stick is moved to the right",
-    "shoulder: -right.y": "shoulder goes down when the right stick is moved towards you",
+    "wrist: -right.x": "wrist moves the tip towards you from rest when the right stick is moved to "
+    "the right",
+    "shoulder: -right.y": "shoulder moves the tip down from rest when the right stick is moved "
+    "towards you",
     " y: -left.x": "tip goes to the left when the left stick is moved to the right",
     "tangential: -left.x": "tip goes to the left when the left stick is moved to the right",
     "{x: -left.y": "tip goes away from you when the left stick is moved towards you",
@@ -273,10 +280,12 @@ def test_a_gripper_and_axes_of_no_stick_have_no_usual_direction() -> None:
     study = load(ROOT / "protocols" / "retrieval" / "joysticks.yaml", discover())
     settings = study.scheme.settings
     assert "map.jaws" not in settings.doubts(study.machine)
-    assert "right stick to the right: the jaws goes down" not in settings.directions(study.machine)
+    assert not any("jaws moves" in said for said in settings.directions(study.machine))
     levers = joint_velocity(map={name: name for name in MACHINES["ch8"].names})
     assert levers.doubts(MACHINES["ch8"]) == {}
-    assert levers.directions(MACHINES["ch8"])[1] == "shoulder forward: the shoulder goes down"
+    assert levers.directions(MACHINES["ch8"])[1] == (
+        "shoulder forward: the shoulder moves the tip down from rest"
+    )
 
 
 def test_the_doctor_says_which_way_the_machine_of_a_study_goes() -> None:
@@ -284,7 +293,7 @@ def test_the_doctor_says_which_way_the_machine_of_a_study_goes() -> None:
     said = [finding.text for finding in directions(study)]
     assert said == [
         "left stick to the right: the slew turns to the right",
-        "left stick towards you: the elbow goes down",
-        "right stick to the right: the wrist goes up",
-        "right stick towards you: the shoulder goes up",
+        "left stick towards you: the elbow moves the tip down from rest",
+        "right stick to the right: the wrist moves the tip away from you from rest",
+        "right stick towards you: the shoulder moves the tip up from rest",
     ]
