@@ -97,12 +97,16 @@ class Trial:
         Seed of everything random in the trial, so that it can be reproduced.
     planned
         The trial as the task planned it.
+    start_pose
+        Joint angles in rad at which a further attempt begins, since the first one did; None for
+        the first.
     """
 
     number: int
     attempt: int
     seed: int
     planned: PlannedTrial
+    start_pose: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)

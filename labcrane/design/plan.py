@@ -387,7 +387,4 @@ def next_attempt(
     none are given. Otherwise the path would begin where the last attempt was cut off.
     """
     words = (study.protocol.study, plan.participant, plan.number, "trial", trial.number, attempt)
-    planned = trial.planned
-    if start and planned.start_pose is None:
-        planned = replace(planned, start_pose=tuple(start))
-    return Trial(trial.number, attempt, derive(*words), planned)
+    return Trial(trial.number, attempt, derive(*words), trial.planned, tuple(start) or None)

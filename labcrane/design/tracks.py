@@ -188,10 +188,7 @@ class PlannedTrack:
         begun = [so_far[each] for each in range(begins, begins + self.size) if each in so_far]
         level = begun[0].level if begun else self.stands(so_far, carried).level
         planned = None if level is None else self.at(trial.number, level)
-        if planned is None:
-            return None
-        start = trial.planned.start_pose or planned.start_pose  # of another attempt: the first's
-        return replace(trial, planned=replace(planned, start_pose=start))
+        return None if planned is None else replace(trial, planned=planned)
 
 
 def plan_rounds(name: str, level: str, trials: Iterable[PlannedTrial]) -> tuple[PlannedTrial, ...]:

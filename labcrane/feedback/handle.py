@@ -1,5 +1,6 @@
 """Handle of one feedback process, which is kept running as the protocol specifies."""
 
+import time
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Literal
@@ -16,6 +17,9 @@ picture take their time, most of all on a busy computer."""
 
 SILENT_S = 3.0
 """A process that presents and has not reported for so long hangs, and is killed."""
+
+WORKED_S = 30.0
+"""So long it is to present until its failures are no longer counted as in a row."""
 
 STOP_S = 5.0
 """How long it may take to stop when told to."""
@@ -84,17 +88,18 @@ class FeedbackHandle:
             return self._replace(why)
         if self._process.ready and not self._told:
             self._told = True
-            self._process.worked()
+            self._since = time.monotonic()
             return [FeedbackReady(self.name, self.facts)]
+        if self._told and time.monotonic() - self._since > WORKED_S:
+            self._process.worked()
         return []
 
     def again(self) -> None:
         """Start it again after it was left out; nothing while it is not."""
         if self.given_up:
             self.given_up = False
-            self._process.worked()  # the count of attempts begins again
             self._begin_anew()
-            self._process.restart(self._order.as_json())
+            self._process.start_anew(self._order.as_json())
 
     def stop(self) -> None:
         """Let it close its windows and devices."""

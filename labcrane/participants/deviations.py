@@ -104,7 +104,7 @@ def all_deviations(places: Places) -> list[tuple[str, Deviation]]:
         found.append((name, Deviation(what=title, detail=detail)))
         found += [
             (name, deviation)
-            for session in _recorded(places, name)
+            for session in sessions_of(places, name)
             for deviation in _read(places.raw(name), session)
         ]
     return sorted(found, key=lambda each: each[0])
@@ -112,7 +112,7 @@ def all_deviations(places: Places) -> list[tuple[str, Deviation]]:
 
 def _of_sessions(places: Places, name: str, entry: Entry) -> Iterable[Deviation]:
     sittings = {sitting.session: sitting.deviations for sitting in entry.sessions}
-    for session in sorted({*sittings, *_recorded(places, name)}):
+    for session in sorted({*sittings, *sessions_of(places, name)}):
         if session not in sittings:
             yield Deviation(what="session not in the register", session=session)
             yield from _read(places.raw(name), session)
@@ -122,7 +122,7 @@ def _of_sessions(places: Places, name: str, entry: Entry) -> Iterable[Deviation]
             yield from settled
 
 
-def _recorded(places: Places, name: str) -> list[int]:
+def sessions_of(places: Places, name: str) -> list[int]:
     """Return the sessions of which there is a journal, or data in the participant file."""
     folder = DataFolder(places.root, name, pilot=False, simulated=False)
     path = folder.participant_file

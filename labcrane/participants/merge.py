@@ -9,6 +9,7 @@ from pathlib import Path
 
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.files.atomic import copy, give_name, sha256, sync_folder
+from labcrane.participants.deviations import sessions_of
 from labcrane.participants.enrolment import check_apart
 from labcrane.participants.folders import Places, entries
 from labcrane.participants.register import (
@@ -50,7 +51,9 @@ class Merged:
     only_there: list[str]
 
 
-def merge(places: Places, other: Places, today: date, known: frozenset[str] | None) -> Merged:
+def merge(
+    places: Places, other: Places, today: date, known: frozenset[str] | None, study: str = ""
+) -> Merged:
     """Take recordings and register of ``other``; may be killed and repeated at any moment.
 
     The recordings are copied byte by byte beside those of the study. They get their places while
@@ -61,6 +64,8 @@ def merge(places: Places, other: Places, today: date, known: frozenset[str] | No
     ----------
     known
         Seals of the study's present lock and of those that it has replaced; None without a lock.
+    study
+        What the study's protocol calls it; needed only while the register here is empty.
 
     Raises
     ------
@@ -78,12 +83,13 @@ def merge(places: Places, other: Places, today: date, known: frozenset[str] | No
         raise ProtocolError(f"{other.root} is the study's own data folder; give the other one")
     state = sha256(other.register)
     ours, theirs = read(places), read(other)
+    ours.study = ours.study or study
     theirs.check_finished()
     taken = [name for name in theirs.participants if name not in ours.participants]
     done = any(each.register_sha256 == state for each in ours.merges)
     if not done:
         found = [
-            *_contradictions(ours, theirs, known),
+            *_contradictions(places, ours, theirs, known),
             *_in_recordings(places, ours, other, theirs),
         ]
         if found:
@@ -92,7 +98,9 @@ def merge(places: Places, other: Places, today: date, known: frozenset[str] | No
             if sha256(other.register) != state:
                 raise RecordingError(f"{other.register} was changed meanwhile; merge again")
             now.check_finished()
-            if found := _contradictions(now, theirs, known):  # somebody was enrolled meanwhile
+            if found := _contradictions(
+                places, now, theirs, known
+            ):  # somebody was enrolled meanwhile
                 raise ProtocolError(_refusal(places, other, found))
             for copied in copies:
                 _give_place(copied, places.raw(copied.name))
@@ -121,7 +129,9 @@ def _refusal(places: Places, other: Places, found: list[str]) -> str:
     )
 
 
-def _contradictions(ours: Register, theirs: Register, known: frozenset[str] | None) -> list[str]:
+def _contradictions(
+    places: Places, ours: Register, theirs: Register, known: frozenset[str] | None
+) -> list[str]:
     """Return what cannot be true in both registers."""
     if ours.study and ours.study != theirs.study:
         return [f"it is of study {theirs.study!r}, this one of {ours.study!r}"]
@@ -133,12 +143,18 @@ def _contradictions(ours: Register, theirs: Register, known: frozenset[str] | No
     ]
     erased = {stone.participant for stone in ours.tombstones}
     erased_there = {stone.participant for stone in theirs.tombstones}
+    here = {*ours.participants, *(each.name for each in recorded(places.root))}
     before = {name for each in ours.merges for name in each.participants}
     found += [
         f"{name} was erased there and not here; erase {name} here first"
-        for name in sorted(erased_there & set(ours.participants))
+        for name in sorted(erased_there & here)
     ]
     for name, entry in sorted(theirs.participants.items()):
+        found += [
+            f"{former} was relabelled {name} there and not here; relabel it here first"
+            for former in entry.formerly
+            if former in here and former not in theirs.participants
+        ]
         if name in erased:
             found.append(f"{name} was erased here and not there; erase {name} there, too")
         elif (own := ours.participants.get(name)) is not None:
@@ -147,7 +163,8 @@ def _contradictions(ours: Register, theirs: Register, known: frozenset[str] | No
             ]:
                 found.append(
                     f"{name} is in both registers with different content: {', '.join(differs)}; "
-                    "if these are two people, relabel one of them"
+                    "if these are two people, relabel one of them; if it is one, merge both "
+                    "laboratories into a new copy of the study without data"
                 )
         elif name in before:
             found.append(f"{name} was merged before and relabelled here; relabel there, too")
@@ -172,11 +189,19 @@ def _in_recordings(
     """Yield why recordings cannot be taken."""
     for name in unregistered(other):
         yield f"{name} has recordings there, but is not in the register there"
-    for name in sorted(theirs.participants):
+    merged = {name for each in (*ours.merges, *theirs.merges) for name in each.participants}
+    for name, entry in sorted(theirs.participants.items()):
         own, folder = places.raw(name), other.raw(name)
         if links := [each for each in (own, folder, *folder.rglob("*")) if each.is_symlink()]:
             yield f"{links[0]} is a link, and links are never followed; put the file itself there"
             continue
+        sessions = sessions_of(other, name)
+        yield from (
+            f"{name}, session {sat.session} is in the register there and not recorded there; put "
+            "its recordings back"
+            for sat in entry.sessions
+            if sat.deviations is not None and sat.session not in sessions
+        )
         for session in DataFolder(other.root, name, pilot=False, simulated=False).sessions():
             try:
                 whole = is_recovered(folder, session)
@@ -189,14 +214,24 @@ def _in_recordings(
                     f"continues it, and labcrane recover {folder} builds the participant file"
                 )
         here, there = _files(own), _files(folder)
-        if here and (there or name not in ours.participants) and here != there:
+        if name in ours.participants and name not in merged and not (here and here == there):
+            yield (
+                f"{name} is in both registers, and no recording shows that it is one person; "
+                "relabel one of them"
+            )
+        elif here and (there or name not in ours.participants) and here != there:
             differs = sorted(file for file, _ in set(here.items()) ^ set(there.items()))
             yield f"{name} has other recordings here: {', '.join(dict.fromkeys(differs))}"
 
 
 def _paths(folder: Path) -> list[Path]:
     """Return every file of a participant but the hidden ones, which are only kept for speed."""
-    return [each for each in entries(folder) if each.is_file() and not each.name.startswith(".")]
+    return [
+        each
+        for each in entries(folder)
+        if each.is_file()
+        and not any(part.startswith(".") for part in each.relative_to(folder).parts)
+    ]
 
 
 def _files(folder: Path) -> dict[str, str]:

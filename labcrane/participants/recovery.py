@@ -47,11 +47,13 @@ def move(places: Places, store: Path) -> Transferred:
         return transfer.transfer(places, store)
 
 
-def join(places: Places, other: Places, today: date, known: frozenset[str] | None) -> Merged:
+def join(
+    places: Places, other: Places, today: date, known: frozenset[str] | None, study: str = ""
+) -> Merged:
     """Take recordings and register of another data folder of the study."""
     with exclusive(places.work_lock):
         _finish(places)
-        return merge.merge(places, other, today, known)
+        return merge.merge(places, other, today, known, study)
 
 
 def _finish(places: Places) -> tuple[Work | None, Erased | Reach | None]:

@@ -272,15 +272,23 @@ UNREGISTERED = (
 )
 
 
+ERASED = "erased: and recordings are here, which labcrane erase removes"
+
+
 def unregistered(places: Places) -> dict[str, str]:
     """Return whose recordings are in the data folder but not in its register, and what that means.
 
     Pilots and simulations are in no register.
     """
-    known = read(places).names()
-    folders = recorded(places.root) if places.root.is_dir() else []
-    names = [each.name for each in folders if DataFolder.pseudonym(each.name) == each.name]
-    return {name: UNREGISTERED for name in names if name not in known}
+    register = read(places)
+    known = {*register.participants, *([register.work.participant] if register.work else [])}
+    erased = {stone.participant for stone in register.tombstones}
+    names = [each.name for each in recorded(places.root)]
+    return {
+        name: ERASED if name in erased else UNREGISTERED
+        for name in names
+        if DataFolder.pseudonym(name) == name and name not in known
+    }
 
 
 def struck(places: Places) -> "dict[str, Struck]":

@@ -170,11 +170,18 @@ class ProcessHandle:
         self.kill()
         if self.fruitless >= self._patience.restarts:
             return False
-        self.fruitless += 1
+        fruitless = self.fruitless + 1
+        self.start_anew(order)
+        self.fruitless = fruitless
+        return True
+
+    def start_anew(self, order: object) -> None:
+        """End the present process and start another; the count of restarts begins again."""
+        self.kill()
+        self.fruitless = 0
         self.restarts += 1
         self.ready = False
         self._life = self._begun(order)
-        return True
 
     def stop(self, patience_s: float | None = None) -> int:
         """Let the process end in order, and kill it when it does not; its exit code.

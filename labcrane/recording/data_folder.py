@@ -19,6 +19,8 @@ def needed_bytes(expected_s: float, bytes_per_s: float, reserve_s: float) -> flo
 
 def recorded(root: Path) -> list[Path]:
     """Return the folders below ``root`` with recordings, pilots and simulations too, by name."""
+    if not root.is_dir():
+        return []
     return [folder for folder in sorted(root.iterdir()) if _is_recorded(folder)]
 
 

@@ -151,7 +151,10 @@ def _run(
         # Recordings of before tests waited to be judged go on at once, as they did.
         so_far = Progress(carried=carried_in(record.context), judged=judged_in(record.context))
         ledger = Ledger(study, plan, so_far)
-        sequencer = Sequencer(study, plan, rig, waits=waits, awaits=script.awaited, ledger=ledger)
+        sequencer = Sequencer(
+            study, plan, rig, waits=waits, awaits=script.awaited, ledger=ledger,
+            sets_back=bool(record.context.get("sets_back")),
+        )  # fmt: skip
         shown: list[Callable[[Frame], None]] = []
         if speed is not None:
             show = _Show(run, f"replay/{participant}/ses-{session:02}", speed)

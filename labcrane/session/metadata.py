@@ -90,6 +90,7 @@ def _of_visit(visit: Visit, plan: SessionPlan) -> dict[str, Any]:
         "fast": visit.fast,
         "pilot": visit.pilot,
         "resumed": visit.resumed,
+        "sets_back": True,
         "clock": "manual" if visit.fast else "lsl",
         "seed": plan.seed,
         "slot": plan.slot,

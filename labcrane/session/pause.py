@@ -57,7 +57,7 @@ class Suspenders:
         self.by: set[str] = set()
         self.ending: list[str] = []
         self.awaited = set(awaits)
-        self._without: set[str] = set()  # views and sounds that are not waited for until back
+        self._without: set[str] = set()  # views and sounds that are not waited for
         for name in sorted(self.awaited):
             note("feedback.awaited", {"what": name})
 
@@ -106,7 +106,6 @@ class Suspenders:
             case FeedbackReady(what, facts):
                 self._note("feedback.ready", {"what": what, "facts": facts})
                 self.awaited.discard(what)
-                self._without.discard(what)
                 self.release(f"feedback {what}")
             case FeedbackLost():
                 self._feedback_lost(report)
@@ -114,8 +113,11 @@ class Suspenders:
                 self._note("launcher.gone", {})
                 self.ending.append("labcrane run was closed or killed")
 
-    def go_on_without(self, what: str) -> None:
-        """Hold the session no longer for a view or sound that has failed, until it is back."""
+    def decide(self, what: str, *, without: bool) -> None:
+        """Go on without a view or sound that fails, or wait for it again where that was decided."""
+        if not without:
+            self._without.discard(what)
+            return
         self.awaited.discard(what)
         self._without.add(what)
         self.release(f"feedback {what}")

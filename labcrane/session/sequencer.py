@@ -64,6 +64,8 @@ class Sequencer:
         no telling.
     awaits
         The views and sounds that must present before the first step begins.
+    sets_back
+        Whether a trial that is repeated begins where its first attempt began.
     ledger
         Keeps account of what remains when the session ends; of ``plan`` unless it was resumed.
 
@@ -82,6 +84,7 @@ class Sequencer:
         waits: bool,
         awaits: Iterable[str] = (),
         ledger: Ledger | None = None,
+        sets_back: bool = True,
     ) -> None:
         self._study = study
         self._plan = plan
@@ -89,6 +92,7 @@ class Sequencer:
         state = Layout("the machine", rig.dynamics.signals)
         self._angles = [state.index(f"joint.angle.{name}") for name in study.machine.names]
         self._waits = waits
+        self._sets_back = sets_back
         self._rate_hz = study.protocol.rate_hz
         self._settings = FeedbackSettings({**study.cues, **study.sounds})
         self._notes: list[tuple[str, dict[str, Value]]] = []  # stamped with the tick they fall in
@@ -301,7 +305,7 @@ class Sequencer:
 
     def _trial(self, block: PlannedBlock, trial: Trial) -> Attempts:
         stalls = 0
-        start = self._pose()
+        start = self._pose() if self._sets_back else ()
         while (ended := (yield from self._attempt_at(block, trial))) in self._redone:
             trial = next_attempt(self._study, self._plan, trial, trial.attempt + 1, start)
             stalls = stalls + 1 if ended is Phase.INTERRUPTED else 0
@@ -320,8 +324,9 @@ class Sequencer:
         self._keep_what_was()
         for component in (*self._rig.components, task):
             component.begin_trial(trial)
-        if trial.planned.start_pose is not None:
-            self._rig.dynamics.reset(trial.planned.start_pose)
+        pose = trial.planned.start_pose or trial.start_pose
+        if pose is not None:
+            self._rig.dynamics.reset(pose)
         self._note("trial.start", **attempt.about)
         self._enter(attempt)
         while not attempt.phase.over:
@@ -432,8 +437,8 @@ class Sequencer:
                 self._wishes.add(order)
             case Completion(completed) if self._attempt is not None:
                 self._attempt.completion = completed
-            case AboutFailed(Order.WITHOUT, what):
-                self._held.go_on_without(what)
+            case AboutFailed(order, what):
+                self._held.decide(what, without=order is Order.WITHOUT)
             case SettingChange():
                 self._note("feedback.setting", **self._settings.change(request))
             case _:

@@ -222,6 +222,40 @@ def relabelled_here(first: Lab, second: Lab) -> str:
     return "P203 was merged before and relabelled here; relabel there, too"
 
 
+def relabelled_there(first: Lab, second: Lab) -> str:
+    join(first, second)
+    unfinished.correct(second.places, "P201", "P299", "wrong number", TODAY)
+    return "P201 was relabelled P299 there and not here; relabel it here first"
+
+
+def relabelled_there_and_copied_here(first: Lab, second: Lab) -> str:
+    shutil.copytree(second.places.raw("P201"), first.places.raw("P201"))
+    unfinished.correct(second.places, "P201", "P299", "wrong number", TODAY)
+    return "P201 was relabelled P299 there and not here; relabel it here first"
+
+
+def erased_there_and_copied_here(first: Lab, second: Lab) -> str:
+    shutil.copytree(second.places.raw("P201"), first.places.raw("P201"))
+    unfinished.erase(second.places, "P201", "withdrew", TODAY)
+    return "P201 was erased there and not here; erase P201 here first"
+
+
+def half_copied(first: Lab, second: Lab) -> str:
+    shutil.rmtree(second.places.raw("P201"))
+    return "P201, session 1 is in the register there and not recorded there; put its recordings"
+
+
+def two_people_of_one_day(first: Lab, second: Lab) -> str:
+    for lab in (first, second):
+        with changed(lab.places) as register:
+            register.participants["P301"] = (
+                register.participants["P102"].model_copy(update={"slot": 9})
+                if lab is first
+                else read(first.places).participants["P301"]
+            )
+    return "P301 is in both registers, and no recording shows that it is one person"
+
+
 FAULTS = (
     other_lock, one_pseudonym_twice, almost_one_pseudonym, erased_there, erased_here,
     other_recordings, still_running, not_registered_there, a_link,
@@ -241,7 +275,18 @@ def check_refused(first: Lab, second: Lab, said: list[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    "fault", [other_study, relabelled_here, *FAULTS], ids=lambda fault: fault.__name__
+    "fault",
+    [
+        other_study,
+        relabelled_here,
+        relabelled_there,
+        relabelled_there_and_copied_here,
+        erased_there_and_copied_here,
+        half_copied,
+        two_people_of_one_day,
+        *FAULTS,
+    ],
+    ids=lambda fault: fault.__name__,
 )
 def test_what_contradicts_is_refused_by_name_and_changes_nothing(
     sites: dict[str, Lab], fault
@@ -358,3 +403,39 @@ def test_laboratories_are_merged_into_a_copy_of_the_study_without_data_as_often_
     assert not (together / "data" / "P201").exists()
     assert main(["where", str(together), "P201"]) == 0
     assert "merged from" in capsys.readouterr().out
+
+
+def test_caches_of_one_laboratory_are_no_recordings(sites: dict[str, Lab]) -> None:
+    """After an export in one of them the next merge was refused."""
+    first, second = sites["hamburg"], sites["dortmund"]
+    join(first, second)
+    for lab, name in ((first, "a"), (second, "b")):
+        cache = lab.places.raw("P201") / ".measures"
+        cache.mkdir(exist_ok=True)
+        (cache / f"{name}.parquet").write_bytes(b"x")
+    second.consent("P205")
+    assert join(first, second).taken == ["P205"]
+
+
+def test_another_study_is_not_taken_into_an_empty_copy(
+    sites: dict[str, Lab], capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second = sites["hamburg"], sites["dortmund"]
+    shutil.rmtree(first.places.root)
+    with changed(second.places) as register:
+        register.study = "welding"
+        for entry in register.participants.values():
+            entry.sessions.clear()
+    shutil.rmtree(second.places.raw("P201"))
+    assert main(["merge", str(first.folder), str(second.folder)]) == 2
+    assert "it is of study 'welding', this one of 'rehearsal'" in capsys.readouterr().err
+
+
+def test_recordings_of_somebody_erased_are_named(sites: dict[str, Lab]) -> None:
+    lab = sites["dortmund"]
+    kept = shutil.copytree(lab.places.raw("P201"), lab.folder / "P201")
+    unfinished.erase(lab.places, "P201", "withdrew", TODAY)
+    assert "P201" not in dict(all_deviations(lab.places))
+    shutil.copytree(kept, lab.places.raw("P201"))
+    assert dict(all_deviations(lab.places))["P201"].what
+    assert ("P201", "erased") in {(name, each.what) for name, each in all_deviations(lab.places)}

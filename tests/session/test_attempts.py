@@ -1,16 +1,21 @@
 """Attempts: whatever cuts a movement off, the next attempt has the movement's whole path."""
 
+import json
 import random
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
 from rehearsal import SHORT, DiesError, DiesInTrial, StallingClock, a_study, rehearse
 
+from labcrane.core.records import PlannedTrial, Trial
+from labcrane.design.tracks import LEVEL, PlannedTrack, plan_rounds
 from labcrane.protocol.study import Study
+from labcrane.protocol.tracks import Track, UpDown
 from labcrane.recording.participant_file.reader import SessionRecord, open_recording
 from labcrane.replay import replay_session
 from labcrane.session.commands import Command, Order, QueueConsole
@@ -120,3 +125,31 @@ def test_a_recording_with_repeated_movements_is_replayed_bit_for_bit(
     path = run(visit, Repeats())
     assert "repeated" in set(open_recording(path).session(1).trials["outcome"])
     assert replay_session(path, 1).difference is None
+    # Recordings of before trials were set back say nothing of it, and go on where they were.
+    with h5py.File(path, "r+") as file:
+        context = json.loads(file["ses-01/context"][()])
+        assert context.pop("sets_back") is True
+        del file["ses-01/context"]
+        file["ses-01/context"] = json.dumps(context)
+    assert replay_session(path, 1).difference is not None
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_track_begins_each_trial_where_its_level_is_planned_to(seed: int) -> None:
+    """Every first attempt began at the pose of the track's first level."""
+    dice = random.Random(seed)
+    poses = {f"{level}": (dice.random(), dice.random()) for level in range(3)}
+    rounds = {
+        name: plan_rounds("t", name, [PlannedTrial({}, 1.0, start_pose=pose)])
+        for name, pose in poses.items()
+    }
+    settings = Track(factor="f", levels={"0": 0.0, "1": 1.0, "2": 2.0}, up_down=UpDown(), start="2")
+    track = PlannedTrack("t", settings, 1, 3, rounds)
+    planned = rounds["0"][0]
+    again = (0.5, 0.5)
+    for trial in (Trial(1, 1, 0, planned), Trial(1, 2, 0, planned, again)):
+        chosen = track.choose(trial, {})
+        assert chosen is not None
+        assert chosen.planned.condition[LEVEL] == "2"
+        assert chosen.planned.start_pose == poses[str(chosen.planned.condition[LEVEL])]
+        assert chosen.start_pose == trial.start_pose

@@ -348,3 +348,25 @@ def test_a_session_held_for_a_sound_begins_nothing_and_goes_on_with_it_or_withou
     }
     assert len(seen.events("pause.start")) == len(seen.events("pause.end")) == (2 if back else 1)
     assert len(seen.trials()) == 2
+
+
+def test_a_session_goes_on_without_a_view_until_it_is_asked_for_again(study: Study) -> None:
+    """One that shows a few pictures and fails held it again each time."""
+    on_fault = OnFault(feedback_lost="pause")
+    study = replace(study, protocol=study.protocol.model_copy(update={"on_fault": on_fault}))
+    fails = [FeedbackLost("screen", "it hangs")]
+    orders = {
+        20: [FeedbackReady("screen", "")],
+        40: fails,
+        60: [Command(Order.WITHOUT, "screen")],
+        80: [FeedbackReady("screen", "")],
+        100: fails,
+        120: [FeedbackLost("screen", "it hangs", left_out=True)],
+        140: [Command(Order.AGAIN, "screen")],
+        160: [FeedbackReady("screen", "")],
+        180: fails,
+        200: [FeedbackReady("screen", "")],
+    }
+    seen = rehearse(study, orders, awaits=("screen",))
+    paused = [number for number, frame in enumerate(seen.frames) if frame.paused]
+    assert paused == [*range(40, 60), *range(180, 200)]

@@ -134,7 +134,7 @@ def merge(
 
     given = first_study(study)
     places, there = Places(one_study(data, data_in(given))), Places(data_of(other))
-    done = unfinished.join(places, there, today(), _seals(given or places.root))
+    done = unfinished.join(places, there, today(), *_approved(given or places.root))
     for what, names in (
         ("taken from there", done.taken),
         ("here already, equal", done.equal),
@@ -154,18 +154,21 @@ def merge(
         out.print(f"{there.root} is unchanged; erase and relabel do not reach it", markup=False)
 
 
-def _seals(study: Path) -> frozenset[str] | None:
-    """Return the seals of a study's lock and of those that it replaced; None without a lock."""
+def _approved(study: Path) -> tuple[frozenset[str] | None, str]:
+    """Return the seals of a study's lock and of those that it replaced, and the study's name.
+
+    None and "" without a lock.
+    """
     from labcrane.approval.lock import lock_path, read_lock
 
     try:
         protocol = protocol_of(study)
     except ProtocolError:  # data alone
-        return None
+        return None, ""
     if not lock_path(protocol).is_file():
-        return None
+        return None, ""
     lock = read_lock(protocol)
-    return lock.replaced | {lock.seal}
+    return lock.replaced | {lock.seal}, str(lock.content["study"])
 
 
 def _say(reach: "Reach") -> None:
