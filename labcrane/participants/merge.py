@@ -100,7 +100,7 @@ def merge(
             now.check_finished()
             if found := _contradictions(
                 places, now, theirs, known
-            ):  # somebody was enrolled meanwhile
+            ):  # someone was enrolled meanwhile
                 raise ProtocolError(_refusal(places, other, found))
             for copied in copies:
                 _give_place(copied, places.raw(copied.name))

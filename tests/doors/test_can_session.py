@@ -63,7 +63,8 @@ class Room:
         self._start = False
 
     def report(self, event) -> None:
-        self._start |= event.name == "waiting"
+        # A fault holds the session until the panel is heard, and nothing is started meanwhile.
+        self._start |= event.name in {"waiting", "pause.end"}
 
     def commands(self) -> list[Command]:
         self.tick += 1
