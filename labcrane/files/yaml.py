@@ -38,7 +38,7 @@ MOST_BITS = 1000
 _MARKS = re.compile(r"[,:\[\]{}\n-]")
 _BRACKETS = re.compile(r"[\[\]{}]")
 _TWO_WHOLE = re.compile(r"[-+]?\d+,\d+(?![\d.eE])")
-_CUT = re.compile(r"[ \t]+(#(?:[^\s#].*|.*\?))\s*$")
+_CUT = re.compile(r"[ \t]+(#(?:[^\s#].*|.*\?))\s*$", re.MULTILINE)
 _OLD = re.compile(r"(?:\ufeff?(?:[ \t]*(?:#.*)?|%(?!YAML).*)\n)*?(?=%YAML[ \t]+1\.[01](?!\d))")
 _STAIRS = re.compile(r"(?:[-?:] *){50}| {200}")
 
@@ -126,6 +126,8 @@ class YamlFile:
         With each place comes the rest of the line, if that may be meant as text: it has no space
         behind the ``#``, or ends in a question mark.
         """
+        if not _CUT.search(self.text):
+            return
         lines = self.text.split("\n")
         for place, node in _plain_texts(YAML(typ="rt", pure=True).compose(self.text), ()):
             end = node.end_mark
