@@ -1,7 +1,8 @@
 """Delay from a recorded change to light and air, from a sensor's samples.
 
-A photodiode on the view's patch sees steps up and down; a microphone hears sounds begin. Both are
-found at half of the way, between two samples, so that a slow sensor adds no delay of its own.
+A photodiode on the view's patch sees steps up and down; a microphone hears sounds begin, and an
+accelerometer feels vibrations begin. They are found at half of the way, between two samples, so
+that a slow sensor adds no delay of its own.
 """
 
 from collections.abc import Sequence
@@ -28,7 +29,8 @@ CONTRAST = 6.0
 PIECE_S, SOUND = 0.01, 3.0
 """Length of sound chunks; loud chunks are so many times louder than quiet ones."""
 
-Kind = Literal["display", "audio"]
+Kind = Literal["display", "audio", "touch"]
+"""What a sensor sees, hears or feels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +104,9 @@ def onsets(times: FloatArray, values: FloatArray) -> list[Change]:
     quiet, most = np.percentile(pieces, (20, 95))
     if not most > SOUND * quiet:
         raise DeviceError(
-            f"the sensor hears no sounds: {most:g} where it is loud and {quiet:g} where it is "
-            "not; put the microphone to the loudspeaker, or turn it up"
+            f"the sensor notices nothing: {most:g} where it is loud and {quiet:g} where it is not; "
+            "put the microphone to the loudspeaker or the accelerometer on the tactor, or turn it "
+            "up"
         )
     found: list[Change] = []
     last = -np.inf

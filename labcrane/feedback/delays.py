@@ -24,7 +24,7 @@ class MeasuredDelay:
     Attributes
     ----------
     kind
-        ``display`` or ``audio``.
+        ``display``, ``audio`` or ``touch``.
     date
         When it was measured: ``2026-03-01``.
     sensor

@@ -1,4 +1,4 @@
-"""Measurement of the delay of a view or a sound, with a sensor that is an LSL stream."""
+"""Measurement of the delay of a view, a sound or a vibration, by a sensor's LSL stream."""
 
 import random
 import time
@@ -41,7 +41,7 @@ SIDE_M = 0.4
 
 
 class Sensor:
-    """One channel of a stream: a photodiode or a microphone, on our clock."""
+    """One channel of a stream: photodiode, microphone or accelerometer, on our clock."""
 
     def __init__(self, name: str, channel: int) -> None:
         self._stream = NewestSample({"name": name}, buffer_s=60)
@@ -128,16 +128,19 @@ class DelayStage:
 
 def measure(
     study: Study,
+    kind: Kind,
     name: str,
     stream: str,
     count: int,
     channel: int = 1,
     say: Callable[[str], None] = lambda text: None,
 ) -> MeasuredDelay:
-    """Measure the delay of the view or sound ``name``.
+    """Measure the delay of the view, sound or vibration ``name``.
 
     Parameters
     ----------
+    kind
+        What the sensor notices.
     stream, channel
         The sensor's stream, and the number of its channel, from 1.
     count
@@ -150,7 +153,7 @@ def measure(
     ProtocolError, StreamError, DeviceError
         It cannot be measured.
     """
-    kind, event = _kind(study, name)
+    event = _patch_event(study, name) if kind == "display" else ""
     built = Rig.build(study, simulated=True)
     with built.opened(study, 0) as run:
         (order,) = (each for each in host_orders(study, run, "doctor") if each.name == name)
@@ -171,19 +174,14 @@ def measure(
     return MeasuredDelay(kind, date.today().isoformat(), stream, found, facts)
 
 
-def _kind(study: Study, name: str) -> tuple[Kind, str]:
-    """Return the kind of component ``name``, and the event at which its patch changes."""
-    if name in study.sounds:
-        return "audio", ""
-    if name not in study.views:
-        known = ", ".join([*study.views, *study.sounds]) or "none"
-        raise ProtocolError(f"there is no view or sound {name!r}; there is {known}")
+def _patch_event(study: Study, name: str) -> str:
+    """Return the event at which the patch of a view changes."""
     patch = getattr(study.views[name].settings, "patch", None)
     if patch is None:
         raise ProtocolError(
             f"view {name!r} has no patch for a photodiode; write patch: {{}} under it"
         )
-    return "display", patch.on[0]
+    return str(patch.on[0])
 
 
 def _frame(run: Run, state: "np.ndarray") -> Frame:
@@ -228,7 +226,7 @@ def _changes(stage: DelayStage, sensor: Sensor, kind: Kind, count: int) -> list[
         stage.change()
         stamp = stage.present()
         if stamp is not None:
-            changes.append(Change(stamp, up=kind == "audio" or bool(number % 2)))
+            changes.append(Change(stamp, up=kind != "display" or bool(number % 2)))
     until = time.perf_counter() + LATE_S
     while time.perf_counter() < until:
         sensor.pull(PULL_S)

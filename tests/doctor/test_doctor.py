@@ -202,7 +202,8 @@ def test_a_study_needs_looks_at_what_it_uses_and_at_nothing_else() -> None:
     ]
     everything, left_out = of_everything(registry)
     assert {"dual_joystick", "sonification", "view"} <= {look.name for look in everything}
-    assert left_out == ["input can: give --protocol with a study that uses it"]
+    alone = ("input can", "feedback vibration")  # they need an address
+    assert left_out == [f"{name}: give --protocol with a study that uses it" for name in alone]
 
 
 def test_a_device_that_no_plugin_can_look_at_is_named(tmp_path: Path) -> None:

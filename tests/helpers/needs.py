@@ -37,6 +37,7 @@ PACKAGES = {
     "jackd": "jackd2",
     "jack_wait": "jackd2",
     "gcc": "gcc libc6-dev",
+    "g++": "g++",
     "sha256sum": "coreutils",
     "ufw": "ufw",
     "unshare": "util-linux",

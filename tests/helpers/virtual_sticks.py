@@ -21,6 +21,9 @@ DESCRIPTION_VERSION = 1
 THRUSTMASTER = (0x044F, 0xB10A)
 
 
+RUMBLE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_uint16, ctypes.c_uint16)
+
+
 class Description(ctypes.Structure):
     """``SDL_VirtualJoystickDesc``, version 1, of SDL 2.24 and newer."""
 
@@ -37,12 +40,21 @@ class Description(ctypes.Structure):
         ("axis_mask", ctypes.c_uint32),
         ("name", ctypes.c_char_p),
         ("user_data", ctypes.c_void_p),
-        ("callbacks", ctypes.c_void_p * 6),
+        ("update", ctypes.c_void_p),
+        ("set_player_index", ctypes.c_void_p),
+        ("rumble", RUMBLE),
+        ("others", ctypes.c_void_p * 3),
     )
 
 
 class VirtualStick:
-    """A stick that is plugged in: a Thrustmaster T.16000M unless said otherwise."""
+    """A stick that is plugged in: a Thrustmaster T.16000M unless said otherwise.
+
+    Attributes
+    ----------
+    rumbled
+        What its motors were told, the heavy and the light one, 0 to 65535.
+    """
 
     def __init__(
         self,
@@ -51,7 +63,11 @@ class VirtualStick:
         model: tuple[int, int] = THRUSTMASTER,
         axes: int = 4,
         buttons: int = 16,
+        *,
+        motors: bool = False,
     ) -> None:
+        self.rumbled: list[tuple[int, int]] = []
+        self._rumble = RUMBLE(lambda _, low, high: self.rumbled.append((low, high)) or 0)
         self._library = library
         self._name = name.encode()  # SDL borrows it
         self._description = Description(
@@ -63,6 +79,7 @@ class VirtualStick:
             vendor=model[0],
             product=model[1],
             name=self._name,
+            rumble=self._rumble if motors else RUMBLE(),
         )
         index = library.SDL_JoystickAttachVirtualEx(ctypes.byref(self._description))
         self._check(index >= 0)

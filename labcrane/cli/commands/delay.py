@@ -1,60 +1,48 @@
-"""Command that measures the delay of views and sounds, by a photodiode or a microphone."""
+"""Command that measures the delay of views, sounds and vibrations, by a sensor."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError
 
-DISPLAY = (
-    "Fix the photodiode over the square in a corner of view {name!r} and shade it. It must be an "
-    "LSL stream of 500 Hz or more."
-)
-AUDIO = (
-    "Put the microphone to the loudspeaker or the headphones of {name!r}, or connect the line "
-    "output. It must be an LSL stream of 1 kHz or more."
-)
+if TYPE_CHECKING:
+    from labcrane.feedback.delay_analysis import Kind
+
+WORDS: "Mapping[Kind, str]" = {"display": "view", "audio": "sound", "touch": "vibration"}
+GUIDES: "Mapping[Kind, str]" = {
+    "display": "Fix the photodiode over the square in a corner of view {name!r} and shade it. It "
+    "must be an LSL stream of 500 Hz or more.",
+    "audio": "Put the microphone to the loudspeaker or the headphones of {name!r}, or connect the "
+    "line output. It must be an LSL stream of 1 kHz or more.",
+    "touch": "Fix the accelerometer to a tactor of {name!r}, and lay both on something soft. It "
+    "must be an LSL stream of 500 Hz or more.",
+}
+"""How to fix the sensor."""
 
 
-def measure_display(
-    protocol: Path, stream: str | None, name: str | None, count: int, channel: int = 1
+def measure_delay(
+    kind: "Kind", protocol: Path, stream: str | None, name: str | None, count: int, channel: int
 ) -> None:
-    """Measure the delay of a view; without a stream, print the known delays of all views.
+    """Measure the delay of a view, a sound or a vibration; without a stream, print what is known.
 
     Parameters
     ----------
     stream, channel
-        The photodiode's stream, and the number of its channel, from 1.
+        The sensor's stream, and the number of its channel, from 1.
     name
-        The protocol's name for the view; the only one by default.
+        The protocol's name for it; the only one by default.
     count
-        Number of changes of the patch.
+        Number of changes.
     """
-    _measure(protocol, "view", DISPLAY, stream, name, count, channel)
-
-
-def measure_audio(
-    protocol: Path, stream: str | None, name: str | None, count: int, channel: int = 1
-) -> None:
-    """Measure the delay of a sound, as :func:`measure_display` that of a view."""
-    _measure(protocol, "sound", AUDIO, stream, name, count, channel)
-
-
-def _measure(
-    protocol: Path,
-    word: str,
-    guide: str,
-    stream: str | None,
-    name: str | None,
-    count: int,
-    channel: int,
-) -> None:
     from labcrane.feedback.delays import delay_in_words, store
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
 
+    word, guide = WORDS[kind], GUIDES[kind]
     study = load(protocol, discover(study=protocol))
-    there = list(study.views if word == "view" else study.sounds)
+    there = list(study.views if kind == "display" else study.sounds)
     if name is None and len(there) == 1:
         name = there[0]
     if stream is None:
@@ -67,7 +55,7 @@ def _measure(
 
     out.print(guide.format(name=name), markup=False)
     measured = measure(
-        study, name, stream, count, channel, lambda text: out.print(text, markup=False)
+        study, kind, name, stream, count, channel, lambda text: out.print(text, markup=False)
     )
     found = measured.delay
     path = store(protocol, name, measured)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labcrane.cli.commands.delay import measure_audio, measure_display
+from labcrane.cli.commands.delay import WORDS, measure_delay
 from labcrane.cli.options import (
     STUDY,
     DataBeside,
@@ -60,12 +60,16 @@ def doctor(
     audio: Annotated[
         bool, typer.Option("--audio", help="measure a sound's delay with a microphone instead")
     ] = False,
+    touch: Annotated[
+        bool,
+        typer.Option("--touch", help="measure a vibration's delay with an accelerometer instead"),
+    ] = False,
     stream: Annotated[
         str | None, typer.Option(help="LSL stream of the sensor; without it nothing is measured")
     ] = None,
     channel: Annotated[int, typer.Option(help="the stream's channel", min=1)] = 1,
     name: Annotated[
-        str | None, typer.Option(help="which view or sound; the only one by default")
+        str | None, typer.Option(help="which view, sound or vibration; the only one by default")
     ] = None,
     count: Annotated[int, typer.Option(help="how many changes are presented", min=2)] = 100,
     local: Local = False,
@@ -78,14 +82,16 @@ def doctor(
     protocol = study or protocol
     if local:
         stay_on_this_computer()
-    if display or audio:
+    asked = {"display": display, "audio": audio, "touch": touch}
+    if any(asked.values()):
         if protocol is None:
             raise ProtocolError(
-                "give the study whose views and sounds to measure: --protocol protocol.yaml"
+                "give the study whose views, sounds and vibrations to measure: --protocol "
+                "protocol.yaml"
             )
-        for wanted, measure in ((display, measure_display), (audio, measure_audio)):
-            if wanted:
-                measure(protocol, stream, name, count, channel)
+        for kind in WORDS:
+            if asked[kind]:
+                measure_delay(kind, protocol, stream, name, count, channel)
     else:
         _examine(protocol, data, peer or (), move=move, as_json=as_json)
 
