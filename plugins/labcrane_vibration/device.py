@@ -44,14 +44,14 @@ Answer = tuple[float, float, float]
 
 
 class Device(ABC):
-    """Tactors, and what they were told last.
+    """Tactors, and their last levels.
 
     Attributes
     ----------
     name
         What it is, in words.
     levels
-        What each was told last, 0 to 1.
+        Of each tactor, the last one that was sent, 0 to 1.
     number
         Number of the last command.
     soonest_s
