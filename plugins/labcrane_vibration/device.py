@@ -13,6 +13,7 @@ import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 
 from labcrane import DeviceError
 from labcrane.core import Finding, Verdict
@@ -137,11 +138,9 @@ class Line(Device):
 
     def close(self) -> None:
         if self.levels and not self._broken:
-            try:
-                self.number += 1
+            self.number += 1
+            with suppress(OSError):  # what is gone stops by itself
                 self.write(f"V {self.number}{' 0' * len(self.levels)}\n".encode())
-            except OSError:
-                pass  # it is gone, and stops by itself
         self._closing.set()
         if self._listener.is_alive():
             self._listener.join()
@@ -231,14 +230,15 @@ class UdpTactors(Line):
             ) from error
 
     def write(self, line: bytes) -> None:
-        self._socket.send(line)
+        with suppress(ConnectionRefusedError):  # of an earlier line; its answer is missing
+            self._socket.send(line)
 
     def read(self) -> bytes:
         try:
             return self._socket.recv(LONGEST)
         except TimeoutError:
             return b""
-        except ConnectionRefusedError:  # nothing listens there yet: the answers will be missed
+        except ConnectionRefusedError:
             self._closing.wait(LISTEN_S)
             return b""
 
