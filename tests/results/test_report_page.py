@@ -239,14 +239,25 @@ def test_the_answer_stands_first_then_the_contents_and_tables_are_folded(
     for name in ("one", "two", "three", "four"):
         page.heading(name)
         page.table(name, pd.DataFrame({"a": [1.0]}))
+    page.sketch(figures.Drawing("drawn", "A line", [], pd.DataFrame({"a": [1.0]})))
     page.lead({"Design": ["within"], "Nothing": []})
     text = page.write().read_text(encoding="utf-8")
-    order = [text.index(part) for part in ("<h1>", 'class="lead"', "<nav", 'id="section-1"')]
+    order = [
+        text.index(part) for part in ("<h1>", 'class="lead"', "<figure", "<nav", 'id="section-1"')
+    ]
     assert order == sorted(order)
     assert "Nothing" not in text
+    assert text.count("<figure") == 1
     assert "A &lt;study&gt;" in text
     assert text.count("<details>") == text.count("<table") == 4
     assert re.findall(r'href="#section-(\d)"', text) == ["1", "2", "3", "4"]
+
+
+SEEN = """
+const seen = [...document.querySelectorAll('table')].filter(e => e.checkVisibility()).length;
+return [seen, document.querySelector('figure').getBoundingClientRect().top];
+"""
+"""How many tables are to be seen, and where the first figure begins."""
 
 
 @pytest.mark.long
@@ -265,3 +276,12 @@ def test_the_report_is_for_everybody_and_nothing_of_it_is_cut(data: Path, tmp_pa
             })  # fmt: skip
             check(browser, f"{each.stem}, dark")
             browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+            browser.refresh()
+            folded, first = browser.execute_script(SEEN)
+            assert folded == 0 and first < 800, "a figure is on the first screen"
+            browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+            folded, _ = browser.execute_script(SEEN)
+            assert folded == browser.execute_script(
+                "return document.querySelectorAll('table').length"
+            )
+            browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})

@@ -28,6 +28,9 @@ WORDS = {
 }
 
 
+FRACTION = (-0.03, 1.03)
+"""Range of an axis of fractions, which are 0 to 1."""
+
 PLACE_WORDS = "position in the sequence"
 MEANS = (
     "Points: means over participants' means, bars: 95 % confidence intervals (t) for three or "
@@ -262,7 +265,9 @@ def sticks(movements: "pd.DataFrame") -> Drawing:
         table = over(movements, measure, ["sequence"])
         each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
         thin = [Series(_numbers(each.index), _numbers(each[one]), FAINT, "line") for one in each]
-        panels.append(Panel(PLACE_WORDS, WORDS[measure], [*thin, _with_ci(table, COLOURS[0])]))
+        drawn = [*thin, _with_ci(table, COLOURS[0])]
+        keep = None if measure == "reversals" else FRACTION
+        panels.append(Panel(PLACE_WORDS, WORDS[measure], drawn, keep=keep))
         tables.append(table.assign(measure=measure))
     caption = (
         f"Use of the sticks over the sequence. {MEANS} of {_of(movements)}"
@@ -347,7 +352,7 @@ def power_curve(table: "pd.DataFrame", whose: str) -> "Figure":
         )
     axes.axhline(0.8, color="0.6", linestyle="--", linewidth=1)
     axes.axhline(0.05, color="0.6", linestyle=":", linewidth=1)
-    axes.set(xlabel="participants", ylabel="share of cohorts with p < 0.05", ylim=(-0.03, 1.03))
+    axes.set(xlabel="participants", ylabel="share of cohorts with p < 0.05", ylim=FRACTION)
     axes.set_title(whose, fontsize="medium")
     axes.set_xticks(table["participants"])
     axes.legend(loc="center right")

@@ -120,21 +120,24 @@ class Page:
             csv=self._csv(drawing.name, drawing.table),
             forms=forms,
             size=size,
+            whole=len(drawing.panels) > 1,
         )
 
     def _add(self, kind: str, **it: object) -> None:
         self._body.append((kind, it))
 
     def write(self) -> Path:
-        """Write the page: the answer and the list of contents before everything else."""
+        """Write the page: first figure, answer and list of contents before everything else."""
         self._path.parent.mkdir(parents=True, exist_ok=True)
         short = len(self._sections) < MOST_WITHOUT_CONTENTS
+        early = [one for one in self._body if one[0] == "figure"][:1] if self._lead else []
         text = rendered(
             TEMPLATE,
             title=self._title,
             lead=self._lead,
             contents=[] if short else self._sections,
-            body=self._body,
+            first=early[0][1] if early else None,
+            body=[one for one in self._body if one not in early],
             up=self._up,
         )
         self._path.write_text(text, encoding="utf-8")

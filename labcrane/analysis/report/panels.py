@@ -74,7 +74,7 @@ class Panel:
     legend
         Heading of the series' labels.
     keep
-        Range of the vertical axis in Matplotlib; None for all values.
+        Range of the vertical axis; None for all values.
     """
 
     across: str
@@ -192,7 +192,8 @@ def _axes(panel: Panel, width: float, height: float) -> Iterator[str]:
     xs = np.concatenate([np.asarray(one.x, float) for one in panel.series] or [np.empty(0)])
     ys = np.concatenate([_reached(one).ravel() for one in panel.series] or [np.empty(0)])
     floor, middle = height - BOTTOM, LEFT + (width - LEFT - RIGHT) / 2.0
-    across, up = _scale(xs, LEFT, width - RIGHT), _scale(ys, floor, TOP)
+    across = _scale(xs, LEFT, width - RIGHT)
+    up = _Scale(*panel.keep, floor, TOP) if panel.keep else _scale(ys, floor, TOP)
     for value in ticks(across.low, across.high):
         x = f"{across(value):.1f}"
         yield f'<path d="M{x} {floor:g}V{TOP:g}" stroke="#ddd"/>'
@@ -206,8 +207,12 @@ def _axes(panel: Panel, width: float, height: float) -> Iterator[str]:
     turned = f' transform="rotate(-90 12 {(TOP + floor) / 2.0:g})"'
     yield _text(12.0, (TOP + floor) / 2.0, panel.up, also=turned)
     yield _text(middle, 15.0, panel.title) if panel.title else ""
+    box = f"{LEFT:g} {TOP:g} {width - LEFT - RIGHT:g} {floor - TOP:g}"
+    x, y, wide, high = box.split()
+    yield f'<svg x="{x}" y="{y}" width="{wide}" height="{high}" viewBox="{box}">'  # cuts at keep
     for one in panel.series:
         yield from _drawn(one, across, up)
+    yield "</svg>"
     yield from _legend(panel, width)
 
 

@@ -143,7 +143,8 @@ def write_report(
         page.say(f"Used on request, though timestamp accuracy is unknown: {'; '.join(unprobed)}.")
     page.lead(answer(cohort, everything, (tables.loop, tables.sync), about, results))
     page.heading("Definitions")
-    page.say(f"Settings of the measures: {settings.as_dict()}")
+    words = "; ".join(f"{name} {_setting(value)}" for name, value in settings.as_dict().items())
+    page.say(f"Settings of the measures: {words}.")
     page.say(_by_which_rule(everything))
     page.table("definitions", defined)
     everything.to_csv(folder / "tables" / "movements.csv", index=False)
@@ -583,6 +584,13 @@ def _by_which_rule(everything: "pd.DataFrame") -> str:
         "movement_onset, movement_time, onset_to_rest and path_length were computed again, and are "
         "not those of the recording."
     )
+
+
+def _setting(value: object) -> str:
+    """Return a setting as people read it; one that is empty is not set."""
+    if isinstance(value, tuple | list):
+        return " and ".join(map(str, value))
+    return str(value) or "not set"
 
 
 def _definitions(cohort: Cohort, everything: "pd.DataFrame") -> "pd.DataFrame":
