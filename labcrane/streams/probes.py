@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 
 WAIT_S = 1.0
 
+FASTER = "over a network use a cable, not WiFi; on this computer end programs that are not needed"
+"""What makes probes come back sooner, and their round trips alike."""
+
 
 class Probe(NamedTuple):
     """One measurement of a source's clock, in the order in which it is stored. Seconds.

@@ -5,7 +5,7 @@ from typing import Any
 from labcrane.session.commands import Order
 from labcrane.web.control_room.snapshot import Snapshot
 from labcrane.web.form import ConsentCard, Form
-from labcrane.web.page import DRAFTS, PRIMARY, SEE_THROUGH, PageContext, prepare
+from labcrane.web.page import DRAFTS, PRIMARY, SEE_THROUGH, THEME, PageContext, prepare
 from labcrane.web.panels import Cameras, Reports
 from labcrane.web.participant_page import STYLE as FORM_STYLE
 from labcrane.web.scene import SceneView
@@ -45,7 +45,7 @@ def supervisor_page(context: PageContext) -> None:
     ui.colors(primary=PRIMARY)
     ui.add_css(STYLE)
     ui.add_css(FORM_STYLE)
-    prepare("en", DRAFTS, SEE_THROUGH)
+    prepare("en", THEME, DRAFTS, SEE_THROUGH)
     snapshot = Snapshot(context, context.earlier)
 
     def give(order: str, text: str) -> str:

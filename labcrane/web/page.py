@@ -32,6 +32,9 @@ DRAFTS = Path(__file__).with_name("drafts.js")
 SEE_THROUGH = Path(__file__).with_name("see_through.js")
 """Has nothing hidden on a page by what can be seen through."""
 
+THEME = Path(__file__).with_name("theme.js")
+"""Makes a page dark or light, as the computer is or as people choose."""
+
 STALE = Path(__file__).with_name("stale.js")
 """Says that a page has heard nothing from its server for 2 s, and takes its buttons away."""
 

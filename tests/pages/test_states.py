@@ -136,6 +136,13 @@ BEGUN: dict[str, tuple[tuple[str, dict], ...]] = {
         ("session.end", {"reason": "ended", "owed": "3 trials"}),
     ),
 }  # fmt: skip
+PLACES = """
+scrollTo(0, 0);
+return [...document.querySelectorAll('.room-actions button')].map(e => {
+    const {x, y, width, height} = e.getBoundingClientRect();
+    return [e.id, x, y, width, height];
+});
+"""
 STATE = "return document.querySelector('.room')?.dataset.state"
 
 
@@ -144,11 +151,15 @@ def test_every_state_of_the_control_room_is_for_everybody(
     tmp_path: Path, browser: webdriver.Chrome
 ) -> None:
     assert set(BEGUN) == set(STATES)
+    places = []
     with pages(tmp_path) as told:
         opened(browser, told.links["supervisor"])
         for state, events in BEGUN.items():
             told.happens(*events)
             wait_for(lambda state=state: browser.execute_script(STATE) == state)
+            if state != "ended":
+                places.append(browser.execute_script(PLACES))
+                assert places[0] == places[-1], f"no button moves in state {state}"
             if state == "fault":
                 shown(browser, "lamp", "left")
                 assert text(browser, "remedy"), "what to do is said"
@@ -168,6 +179,8 @@ def test_every_state_of_the_control_room_is_for_everybody(
         check(browser, "supervisor-report")
         browser.refresh()
         shown(browser, "report-verdict", "remaining: 3 trials")
+        press(browser, "close-page")
+        shown(browser, "closed", "Close this tab")
 
 
 @pytest.mark.timeout(900)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from labcrane.recording.pictures import LOG, RATE_S
 from labcrane.recording.xdf.header import StreamHeader
-from labcrane.streams.probes import Probe
+from labcrane.streams.probes import FASTER, Probe
 
 COUNTERS = frozenset({"counter", "samplecounter", "packetcounter", "framenumber"})
 
@@ -160,9 +160,7 @@ def complaints(health: Health) -> list[str]:
             "and that UDP passes the firewall"
         )
     if health.rtt_s is not None and health.rtt_s > RTT_S:
-        found.append(
-            f"answers clock probes in {1e3 * health.rtt_s:.1f} ms: use a cable instead of WiFi"
-        )
+        found.append(f"answers clock probes in {1e3 * health.rtt_s:.1f} ms: {FASTER}")
     if health.missing:
         found.append(f"has lost {health.missing} samples by its own counter")
     return found

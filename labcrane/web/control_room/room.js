@@ -8,6 +8,15 @@ const TYPES_IN = new Set(["INPUT", "TEXTAREA", "SELECT"]);
 export default {
   template: `
 <div class="room" :data-state="s.state" :data-level="s.lamp.level">
+  <div class="room-actions" role="toolbar" aria-label="Actions" v-show="s.state !== 'ended'">
+    <button v-for="b in [...s.buttons.filter((one) => !one.danger), ...dangerous]" :key="b.ident" :id="b.ident"
+      type="button" @click="press(b)" class="room-button" :class="{primary: b.primary, danger: b.danger}"
+      :aria-disabled="b.why ? 'true' : 'false'" :title="b.why || b.label">{{ b.label }} <kbd aria-hidden="true">{{ b.key }}</kbd></button>
+    <button type="button" class="room-button quiet" id="help" @click="open('keys')"
+      aria-label="Keys">?</button>
+    <button type="button" class="room-button quiet" id="theme" @click="theme()">Dark or light</button>
+  </div>
+
   <header class="room-head">
     <div class="room-lamp" :class="s.lamp.level" role="status">
       <span class="room-bulb" aria-hidden="true">{{ mark }}</span>
@@ -43,15 +52,6 @@ export default {
   <p v-for="question in s.questions" :key="question.ident" :id="question.ident"
      class="room-question">{{ question.text }}</p>
 
-  <div class="room-actions" role="toolbar" aria-label="Actions" v-show="s.state !== 'ended'">
-    <button v-for="b in [...s.buttons.filter((one) => !one.danger), ...dangerous]" :key="b.ident" :id="b.ident"
-      type="button" @click="press(b)" class="room-button" :class="{primary: b.primary, danger: b.danger}"
-      :aria-disabled="b.why ? 'true' : 'false'" :title="b.why || b.label">{{ b.label }} <kbd aria-hidden="true">{{ b.key }}</kbd></button>
-    <button type="button" class="room-button quiet" id="help" @click="open('keys')"
-      aria-label="Keys">?</button>
-    <button type="button" class="room-button quiet" id="theme" @click="theme()">
-      {{ dark ? 'Light' : 'Dark' }}</button>
-  </div>
   <section v-if="s.instructions" class="room-card" aria-label="Instructions"><h2>The operator reads</h2>
     <p class="room-lines" id="instructions">{{ s.instructions }}</p></section>
   <div class="room-reports"><slot name="reports"></slot></div>
@@ -70,7 +70,8 @@ export default {
           <td v-for="(cell, of) in row" :key="of">{{ cell }}</td></tr></tbody></table>
     </div>
     <ul><li v-for="line in s.report.advice" :key="line">{{ line }}</li></ul>
-    <p><button type="button" class="room-button primary" id="close-page" @click="close()">
+    <p v-if="closed" role="status" id="closed">The session's pages are closed. Close this tab.</p>
+    <p v-else><button type="button" class="room-button primary" id="close-page" @click="close()">
       Close this page</button> <span class="room-faint">It stays open until you close it, even after a
       reload.</span></p>
   </section>
@@ -202,7 +203,7 @@ export default {
   props: { first: Object, keys: Array },
   data() {
     return {
-      s: this.first, kind: "", find: "", measure: "", told: "", asked: null, dark: false,
+      s: this.first, kind: "", find: "", measure: "", told: "", asked: null, closed: false,
       waiting: {}, count: 0,
       words: [
         { order: "note", label: "Note", key: "N", text: "", most: 4000 },
@@ -269,10 +270,6 @@ export default {
     } },
   },
   mounted() {
-    let kept = null;
-    try { kept = localStorage.getItem("labcrane-theme"); } catch { /* a browser that keeps nothing */ }
-    this.dark = kept ? kept === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-    this.paint();
     addEventListener("keydown", this.key);
     this.timer = setInterval(this.again, AGAIN_MS);
   },
@@ -309,7 +306,7 @@ export default {
     send(field) { const text = field.text.trim(); if (text) this.give(field.order, text, field); },
     end(f) { return f.buttons.length ? this.dangerous.filter((b) => b.order === "end").map((b) => ({ ...b, ident: `end-${f.ident}` })) : []; },
     set(c, value) { this.give("setting", `${c.place}=${value}`); },
-    close() { this.$emit("close"); },
+    close() { this.closed = true; this.$emit("close"); },
     open(which) { if (!this.$refs[which].open) this.$refs[which].showModal(); },
     key(e) {
       if (e.ctrlKey || e.altKey || e.metaKey || e.repeat) return;
@@ -332,12 +329,7 @@ export default {
       else return;
       e.preventDefault();
     },
-    theme() {
-      this.dark = !this.dark;
-      try { localStorage.setItem("labcrane-theme", this.dark ? "dark" : "light"); } catch { /* as above */ }
-      this.paint();
-    },
-    paint() { document.documentElement.dataset.theme = this.dark ? "dark" : "light"; },
+    theme() { labcraneTheme(); },
     height(v) { const [low, high] = this.range; return 132 - 122 * (v - low) / (high - low); },
     short(v) { return Number(v).toPrecision(3).replace(/\.?0+$/, ""); },
     valued(c) { return typeof c.now === "number" ? `${this.short(c.now)} ${c.unit}`.trim() : String(c.now); },

@@ -71,7 +71,7 @@ def _sentence(event: Event, called: Callable[[int], str]) -> Sentence:
         return _order(what, data)
     named = {"trial": _trial(data, called)} if "trial" in data else {}
     about = ", ".join(
-        str(value) if key == "trial" else f"{key} {value}"
+        str(value) if key == "trial" else f"{key} {_plain(value)}"
         for key, value in {**data, **named}.items()
         if value not in {None, ""}
     )
@@ -97,6 +97,11 @@ def _order(what: str, data: Data) -> Sentence:
 
 def _trial(data: Data, called: Callable[[int], str]) -> str:
     return called(int(str(data.get("trial", 0))))
+
+
+def _plain(value: Value) -> str:
+    """Return a value with as many digits as people read; the raw data has all."""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 class _Told(dict[str, Value]):

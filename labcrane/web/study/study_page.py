@@ -65,7 +65,8 @@ def _figures(overview: Overview) -> Iterator[tuple[str, str, str, str]]:
     full = overview.lasts is not None and overview.lasts < FEW
     others = len(overview.people) - len(real)
     beside = f"; {others} simulated or pilot, not counted" if others else ""
-    yield "complete", f"{complete} of {len(real)}", f"participants{beside}", ""
+    done = "ok" if complete else ""
+    yield "complete", f"{complete} of {len(real)}", f"participants{beside}", done
     yield "due", str(len(overview.due)), f"{overdue} overdue", "warn" if overdue else ""
     yield "sessions", str(sessions), f"{doubtful} to review", "warn" if doubtful else ""
     yield "disk", size(overview.used), f"{size(overview.free)} free{lasts}", "bad" if full else ""

@@ -147,7 +147,6 @@ export default {
   },
   mounted() {
     addEventListener("keydown", this.key);
-    document.documentElement.dataset.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
     const first = this.about.signals.findIndex((one) => one.column.startsWith("tip.position"));
     this.charts.forEach((chart, n) => { // the tip's three ways, before anything is chosen
       const at = this.about.signals.findIndex((one) => one.column === `tip.position.${"xyz"[n]}`);

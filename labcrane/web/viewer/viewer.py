@@ -8,7 +8,7 @@ from labcrane.errors import LabcraneError, RecordingError
 from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.registry.registry import Registry
 from labcrane.web.control_room.shown import ShownShapes
-from labcrane.web.page import PRIMARY, SEE_THROUGH, prepare
+from labcrane.web.page import PRIMARY, SEE_THROUGH, THEME, prepare
 from labcrane.web.scene import MachineScene, camera_buttons
 from labcrane.web.server.access import VIEWER
 from labcrane.web.server.serving import AWAY_S, build_pages, serve_here
@@ -61,7 +61,7 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
     ui.colors(primary=PRIMARY)
     ui.add_css(STYLE)
     ui.add_css(HERE / "viewer.css")
-    prepare("en", SEE_THROUGH)
+    prepare("en", THEME, SEE_THROUGH)
     screens, lacking = [], []
     for film in films:
         cues, why = film.cues(registry)

@@ -14,6 +14,7 @@ from labcrane.recording.foreign_streams import (
     UNSTAMPED,
     RecordedStream,
 )
+from labcrane.streams.probes import FASTER
 from labcrane.streams.sync.quality import Quality
 from labcrane.streams.sync.raw import ASSUMED_RTT_S
 from labcrane.streams.sync.report.certificate import (
@@ -327,14 +328,14 @@ def _clock(quality: Quality, limits: Limits) -> list[Finding]:
         found,
         limits.residual_s.judge(quality.residual_s),
         f"its clock scatters by {1e3 * quality.residual_s:.3f} ms",
-        "use a cable instead of WiFi, and switch off power saving on its computer",
+        FASTER,
     )
     _add(
         found,
         limits.rtt_s.judge(quality.rtt_p95_s),
         f"clock probes take {1e3 * quality.rtt_p95_s:.2f} ms, so that "
         f"{500 * quality.rtt_p95_s:.2f} ms may be hidden",
-        "use a cable instead of WiFi, on the same switch",
+        FASTER,
     )
     _add(
         found,
