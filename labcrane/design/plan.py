@@ -124,6 +124,11 @@ class PlannedStep:
     points: tuple[tuple[float, float], ...] = ()
 
     @property
+    def title(self) -> str:
+        """Its name: that of its block or questionnaires, or its kind."""
+        return self.block.name if self.block else ", ".join(self.questionnaires) or self.kind
+
+    @property
     def expected_s(self) -> float:
         """Expected duration in seconds."""
         if self.block:

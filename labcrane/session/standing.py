@@ -70,8 +70,10 @@ class Standing:
         What runs in it.
     what
         What waits to be started, if something does.
-    kind
-        Kind of the step that runs.
+    kind, step
+        Kind and number of the step that runs.
+    done
+        Number of the step that was done last.
     holds
         Who and what holds it.
     trial
@@ -87,6 +89,8 @@ class Standing:
     stage: SessionStage = SessionStage.STARTING
     what: str = ""
     kind: str = ""
+    step: int = 0
+    done: int = 0
     holds: frozenset[str] = frozenset()
     trial: Mapping[str, Any] = field(default_factory=dict)
     last: Mapping[str, Any] = field(default_factory=dict)
@@ -105,7 +109,9 @@ class Standing:
             now = now.at(RUNS[name])
         match name:
             case "step.start":
-                return replace(now, kind=str(data["kind"]))
+                return replace(now, kind=str(data["kind"]), step=int(data["step"]))
+            case "step.end" if data["done"]:
+                return replace(now, done=int(data["step"]))
             case "waiting":
                 return replace(now, what=str(data["what"]))
             case "order.start" if data["refused"] is None and not self.paused:

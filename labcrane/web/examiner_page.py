@@ -30,6 +30,7 @@ KEYS: tuple[tuple[str, str], ...] = (
     ("G", "go on without a view or sound that has failed"),
     ("Q", "fill in the questionnaire"),
     ("D", "dark or light"),
+    ("W", "on the wall: the status large enough for 3 m, and back"),
     ("?", "show these keys"),
 )
 """What each key of the page does."""

@@ -104,6 +104,7 @@ def test_a_session_is_led_by_keys_alone_and_every_state_is_for_everybody(  # noq
         photograph(browser, "running")
 
         # A slider changes what is drawn, and the record says so.
+        keys(browser, "f")
         wait_for(lambda: browser.execute_script(NAMED).get("sphere"))
         browser.execute_script(SET, "setting-ball-smallest", "0.36")
         shown(browser, "events", "Ball.smallest was set to 0.36")
@@ -128,7 +129,7 @@ def test_a_session_is_led_by_keys_alone_and_every_state_is_for_everybody(  # noq
         keys(browser, Keys.SPACE)
         shown(browser, "stage", "trial")
         keys(browser, "r")
-        shown(browser, "facts", "attempt 2")
+        shown(browser, "now", "attempt 2")
         keys(browser, "o")
         shown(browser, "events", "Override was requested")
         keys(browser, "c")

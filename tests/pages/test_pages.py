@@ -108,7 +108,7 @@ def test_a_session_is_led_and_answered_from_a_browser(  # noqa: PLR0915 - one vi
         press(browser, "order-completion1")
         shown(browser, "events", "Completion 1 was requested")
         press(browser, "order-repeat")
-        shown(browser, "facts", "attempt 2")
+        shown(browser, "now", "attempt 2")
         press(browser, "order-skip")
         press(browser, "order-skip-sure")
         shown(browser, "events", "Skip was requested")

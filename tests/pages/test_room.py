@@ -6,6 +6,7 @@ import re
 import threading
 import time
 from pathlib import Path
+from textwrap import indent
 from types import SimpleNamespace
 
 import pylsl
@@ -86,7 +87,7 @@ BEGUN = {
         ("pause.start", {"by": "stop rule"}),
     ),
     "judgement": (("judgement.awaited", {"trial": 1, "attempt": 1}),),
-    "between": (("trial.start", TRIAL), ("step.end", {"step": 1})),
+    "between": (("trial.start", TRIAL), ("step.end", {"step": 1, "done": True})),
     "ended": (("session.end", {"reason": "complete", "owed": ""}),),
 }
 
@@ -94,7 +95,7 @@ BEGUN = {
 def test_every_state_is_reached_by_what_a_session_says() -> None:
     assert set(BEGUN) == set(STATES)
     found = {name: state_of(after(*events)) for name, events in BEGUN.items()}
-    found["between"] = state_of(after(("step.end", {"step": 1})))
+    found["between"] = state_of(after(("step.end", {"step": 1, "done": True})))
     assert found == {name: name for name in STATES}
 
 
@@ -462,6 +463,8 @@ def test_a_page_that_knows_nothing_of_a_study_s_streams_does_not_say_that_there_
             study=study, plan=plan_session(study, "P001", 1), session=SessionView()
         )
         assert Snapshot(context, Earlier())._without_streams() == said
+        context.session.hear_of_streams({"streams": [{"label": "eeg", "name": "amp"}]})
+        assert Snapshot(context, Earlier())._without_streams() == ""
     view, expected = after(*BEGUN["running"]), ExpectedSession(1 / 240, streams=["eeg"])
     assert lamp_of(view, Punctual(), expected).reason == "no data on the streams eeg"
     view.hear_of_streams({"streams": []})
@@ -484,6 +487,30 @@ def test_a_browser_of_pages_that_died_is_not_waited_for_at_the_end(
     finally:
         pages._closed.set()
         pages.close(SessionLeft("ok", "over"))
+
+
+def test_the_strip_of_steps_says_what_is_done_what_runs_and_how_long_each_takes(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "study.yaml"
+    steps = "- instructions: lift.md\n- break: {seconds: 300}\n- block: {task: aiming}\n"
+    steps = indent(steps, 6 * " ")
+    (tmp_path / "lift.md").write_text("Lift it.\n")
+    path.write_text(STUDY.format(study="strip", steps=steps), encoding="utf-8")
+    study = load(path, discover())
+    plan = plan_session(study, "P001", 1)
+    began, ended = ("step.start", {"step": 1, "kind": "instructions"}), ("step.end", {"step": 1})
+    for events, states in (
+        ((), ["", "", ""]),
+        ((began,), ["now", "", ""]),
+        ((began, (ended[0], {**ended[1], "done": True})), ["done", "", ""]),
+        ((began, (ended[0], {**ended[1], "done": False})), ["now", "", ""]),
+    ):
+        context = SimpleNamespace(study=study, plan=plan, session=after(*events))
+        found = Snapshot(context, Earlier())._steps()
+        assert [step["state"] for step in found] == states
+        assert [step["name"] for step in found] == ["instructions", "break", "aiming"]
+        assert [step["time"] for step in found[:2]] == ["2 min", "5 min"]
 
 
 def test_times_are_minutes_and_seconds_and_hours_where_there_are_some() -> None:
@@ -539,7 +566,7 @@ def test_instructions_are_on_the_page_until_the_operator_has_read_them() -> None
     assert (start.label, start.primary) == ("They have read it: go on", True)
     assert view.instructions == "Lift the log."
     assert view.text == "The operator reads the instructions"
-    view = after(*read, ("step.end", {"step": 1}), ("waiting", {"what": "aiming"}))
+    view = after(*read, ("step.end", {"step": 1, "done": True}), ("waiting", {"what": "aiming"}))
     start = next(one for one in buttons(view) if one.ident == "order-start")
     assert (start.label, view.instructions) == ("Start: aiming", "")
     assert view.text == "ready to start: aiming"

@@ -77,6 +77,7 @@ def test_what_stands_around_the_machine_is_drawn_where_the_session_has_it(
         wait_for(
             lambda: counted(browser.execute_script(SEEN)) == parts
         )  # one arrives after another
+        press(browser, "raw")
         shown(browser, "facts", "loop at most")
         seen = browser.execute_script(SEEN)
         photograph(browser, "scenario")

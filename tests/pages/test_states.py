@@ -1,6 +1,7 @@
 """Every state of both pages in a browser: for everybody by WCAG AA, nothing cut at three sizes."""
 
 import json
+import math
 import os
 import time
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ import pytest
 from faults.sessions import unique, wait_for
 from pages.looks import check
 from pages.room import STUDY, press, shown, text
+from pages.test_control_room import keys
 from selenium import webdriver
 from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.by import By
@@ -125,7 +127,7 @@ BEGUN: dict[str, tuple[tuple[str, dict], ...]] = {
     ),
     "between": (
         ("pause.end", {"by": "stop rule"}),
-        ("trial.end", {**TRIAL, "outcome": "success"}), ("step.end", {"step": 1}),
+        ("trial.end", {**TRIAL, "outcome": "success"}), ("step.end", {"step": 1, "done": True}),
     ),
     "judgement": (("judgement.awaited", {"trial": 1, "attempt": 1}),),
     "break": (("break.start", {"seconds": 300}),),
@@ -143,6 +145,21 @@ return [...document.querySelectorAll('.room-actions button')].map(e => {
     return [e.id, x, y, width, height];
 });
 """
+ARCMIN = math.degrees(0.277 / 3000.0) * 60.0
+"""Of a pixel of a display of 24 inches (1920 pixels on 531 mm) from 3 m; 16 are needed to read."""
+
+SMALLEST = """
+const walk = document.createTreeWalker(document.querySelector('.room'), NodeFilter.SHOW_TEXT);
+let least = Infinity;
+while (walk.nextNode()) {
+    const e = walk.currentNode.parentElement;
+    if (walk.currentNode.textContent.trim() && e.checkVisibility())
+        least = Math.min(least, parseFloat(getComputedStyle(e).fontSize));
+}
+return least;
+"""
+"""The size of the smallest letters on the page, in pixels."""
+
 STATE = "return document.querySelector('.room')?.dataset.state"
 
 
@@ -174,6 +191,13 @@ def test_every_state_of_the_control_room_is_for_everybody(
             if state == "consent":
                 shown(browser, "consent-version", CONSENT["version"])
             check(browser, f"supervisor-{state}")
+            keys(browser, "w")
+            smallest = browser.execute_script(SMALLEST)
+            assert ARCMIN * smallest >= 16.0, f"{state} is not read from 3 m"
+            assert text(browser, "who").startswith("P001")
+            if state == "fault":
+                check(browser, "wall")
+            keys(browser, "w")
         told.ends()
         shown(browser, "report-verdict", "remaining: 3 trials")
         check(browser, "supervisor-report")

@@ -7,7 +7,7 @@ const TYPES_IN = new Set(["INPUT", "TEXTAREA", "SELECT"]);
 
 export default {
   template: `
-<div class="room" :data-state="s.state" :data-level="s.lamp.level">
+<div class="room" :class="{wall}" :data-state="s.state" :data-level="s.lamp.level">
   <div class="room-actions" role="toolbar" aria-label="Actions" v-show="s.state !== 'ended'">
     <button v-for="b in [...s.buttons.filter((one) => !one.danger), ...dangerous]" :key="b.ident" :id="b.ident"
       type="button" @click="press(b)" class="room-button" :class="{primary: b.primary, danger: b.danger}"
@@ -37,8 +37,10 @@ export default {
       <progress :value="s.done" :max="s.total || 1" aria-label="trials done"></progress>
       <p class="room-faint" id="progress">{{ s.done }} of {{ s.total }} trials</p>
     </div>
-    <p class="room-faint room-facts" id="facts">{{ s.facts }}</p>
   </header>
+  <ol class="room-steps" id="steps" aria-label="Steps of the session">
+    <li v-for="(step, at) in s.steps" :key="at" :class="step.state" :aria-current="step.state === 'now' && 'step'">
+      {{ step.state === 'done' ? '✓' : '' }} {{ step.name }} <span class="room-faint">{{ step.time }}</span></li></ol>
 
   <p v-if="s.alarm" id="alarm" role="alert" class="room-alarm">{{ s.alarm }}</p>
   <section v-if="s.faults.length" class="room-card room-faults" id="faults" aria-label="Faults">
@@ -49,9 +51,6 @@ export default {
           :id="b.ident" @click="press(b)">{{ b.label }} <kbd aria-hidden="true">{{ b.key }}</kbd></button></td>
       </tr></tbody></table>
   </section>
-  <p v-for="question in s.questions" :key="question.ident" :id="question.ident"
-     class="room-question">{{ question.text }}</p>
-
   <section v-if="s.instructions" class="room-card" aria-label="Instructions"><h2>The operator reads</h2>
     <p class="room-lines" id="instructions">{{ s.instructions }}</p></section>
   <div class="room-reports"><slot name="reports"></slot></div>
@@ -145,19 +144,8 @@ export default {
       </section>
     </div>
     <div class="room-column">
-      <section class="room-card"><h2>Lateness</h2>
-        <p v-if="!s.late.length" class="room-faint">Waiting for frames from the session.</p>
-        <template v-else><svg class="room-chart small" viewBox="0 0 400 70" role="img"
-          :aria-label="s.lateText"><line class="room-limit" x1="0" x2="400" :y1="tick" :y2="tick"/>
-          <path class="room-late" :d="lateness"/></svg>
-        <p class="room-faint" id="lateness">{{ s.lateText }}</p></template>
-        <div v-for="one in s.presented" :key="one.label" class="room-stream" :class="one.level">
-          <svg viewBox="0 0 90 24" role="img" :aria-label="'rate of ' + one.label">
-            <path :d="trace(one.trace)"/></svg>
-          <span><strong>{{ one.label }}</strong> {{ one.words }}</span></div>
-      </section>
-      <section class="room-card" id="streams"><h2>External streams</h2>
-        <p v-if="!s.streams.length" class="room-faint">{{ s.noStreams }}</p>
+      <section class="room-card" id="streams"><h2>Streams</h2>
+        <p class="room-faint">{{ s.noStreams }}</p>
         <div v-for="one in s.streams" :key="one.label" class="room-stream" :class="one.level">
           <svg viewBox="0 0 90 24" role="img" :aria-label="'rate of ' + one.label">
             <path :d="trace(one.trace)"/></svg>
@@ -167,11 +155,9 @@ export default {
               :id="a.ident" @click="press(a)">{{ a.label }}</button></span>
         </div>
       </section>
-      <section class="room-card" id="settings" v-show="s.state !== 'ended'">
-        <h2>Cues and sounds</h2>
-        <p v-if="!s.settings.length" class="room-faint">This study has no settings that can be changed.</p>
-        <details v-for="one in s.settings" :key="one.name" open><summary>{{ one.name }}
-          <span class="room-faint">{{ one.use }}</span></summary>
+      <details class="room-card" id="settings" v-show="s.state !== 'ended' && s.settings.length">
+        <summary>Cues and sounds</summary>
+        <section v-for="one in s.settings" :key="one.name"><h3>{{ one.name }} <span class="room-faint">{{ one.use }}</span></h3>
           <div v-for="c in one.controls" :key="c.ident" class="room-slider">
             <label :for="'setting-' + c.ident" :title="c.about">{{ c.key }}</label>
             <input v-if="c.kind === 'range'" type="range" :id="'setting-' + c.ident" :min="c.low"
@@ -182,8 +168,17 @@ export default {
               <option v-for="choice in c.choices" :key="choice">{{ choice }}</option></select>
             <output v-if="c.kind === 'range'" :id="'now-' + c.ident" :class="{changed: c.now !== c.protocol}">{{ valued(c) }}</output>
           </div>
-        </details>
-      </section>
+        </section>
+      </details>
+      <details class="room-card" id="raw"><summary>Internals</summary>
+        <p class="room-faint" id="facts">{{ s.facts }}</p>
+        <p v-for="question in s.questions" :key="question.ident" :id="question.ident" class="room-question">{{ question.text }}</p>
+        <p v-if="!s.late.length" class="room-faint">Waiting for frames from the session.</p>
+        <template v-else><svg class="room-chart small" viewBox="0 0 400 70" role="img"
+          :aria-label="s.lateText"><line class="room-limit" x1="0" x2="400" :y1="tick" :y2="tick"/>
+          <path class="room-late" :d="lateness"/></svg>
+        <p class="room-faint" id="lateness">{{ s.lateText }}</p></template>
+      </details>
     </div>
   </div>
 
@@ -204,6 +199,7 @@ export default {
   data() {
     return {
       s: this.first, kind: "", find: "", measure: "", told: "", asked: null, closed: false,
+      wall: new URLSearchParams(location.search).has("wall"),
       waiting: {}, count: 0,
       words: [
         { order: "note", label: "Note", key: "N", text: "", most: 4000 },
@@ -320,16 +316,22 @@ export default {
       if (b && this.s.state !== "ended") this.press(b);
       else if (key === "?") this.open("keys");
       else if (at) document.getElementById(at)?.focus();
-      else if (key === "F") document.querySelector("#settings input, #settings select")?.focus();
+      else if (key === "F") this.cues();
       else if (key === "Q") document.querySelector(".room-form button, .room-form input")?.focus();
       else if (key === "T") document.querySelector("#streams button")?.focus();
       else if (key === "V") document.querySelector("#faults [id^=again-]")?.focus();
       else if (key === "G") document.querySelector("#faults [id^=without-]")?.focus();
       else if (key === "D") this.theme();
+      else if (key === "W") this.wall = !this.wall;
       else return;
       e.preventDefault();
     },
     theme() { labcraneTheme(); },
+    cues() {
+      const cues = document.getElementById("settings");
+      cues.open = true;
+      cues.querySelector("input, select")?.focus();
+    },
     height(v) { const [low, high] = this.range; return 132 - 122 * (v - low) / (high - low); },
     short(v) { return Number(v).toPrecision(3).replace(/\.?0+$/, ""); },
     valued(c) { return typeof c.now === "number" ? `${this.short(c.now)} ${c.unit}`.trim() : String(c.now); },

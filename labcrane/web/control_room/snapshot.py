@@ -78,7 +78,7 @@ class Snapshot:
     def _head(self) -> dict[str, Any]:
         context = self._context
         session, plan = context.session, context.plan
-        state = state_of(session)
+        state, steps = state_of(session), self._steps()
         holds = "".join(f" · {held(by)}" for by in sorted(session.standing.holds))
         trouble = context.shown.trouble or context.live.trouble
         lamp = lamp_of(session, context.live, self._expected, trouble)
@@ -92,7 +92,8 @@ class Snapshot:
             "now": self._running() if state == "running" else STATES.get(state, ""),
             "instructions": session.instructions,
             "stage": session.text + holds,
-            "next": self._next(),
+            "steps": steps,
+            "next": next((s["name"] for s in steps if not s["state"]), "the end of the session"),
             "facts": " · ".join(self._facts()),
             "left": self._left(state),
             "done": session.trials_done,
@@ -109,7 +110,6 @@ class Snapshot:
         context = self._context
         live, session = context.live, context.session
         lines = session.assessment.lines(live.newest, context.study.protocol.indicator)
-        streams = self._streams()
         return {
             "questions": asked(context.study),
             "bars": groups(live.newest, live.units, context.study.machine.joints, live.moved),
@@ -122,9 +122,8 @@ class Snapshot:
             "late": [[round(1000 * part, 2) for part in band] for band in live.bands],
             "lateText": self._lateness(),
             "tickMs": 1000 * self._period_s,
-            "streams": [one for name, one in streams if not name.startswith(LOG)],
+            "streams": self._streams(),
             "noStreams": self._without_streams(),
-            "presented": self._presented(streams),
             "settings": self._settings(),
             "kinds": list(FILTERS),
             "events": self._events(),
@@ -144,12 +143,20 @@ class Snapshot:
             })  # fmt: skip
         return found
 
-    def _running(self) -> str:
-        called = self._called(self._context.session.trial["trial"])
-        return called[:1].upper() + called[1:]
+    def _steps(self) -> list[dict[str, str]]:
+        """Return the session's steps: their names, what is done, and how long each takes."""
+        standing, found = self._context.session.standing, []
+        for step in self._context.plan.steps:
+            runs = "now" if step.number == standing.step else ""
+            state = "done" if step.number <= standing.done else runs
+            found.append({"name": step.title, "state": state, "time": _long(step.expected_s)})
+        return found
 
-    def _called(self, number: object) -> str:
-        return self._counts.name(int(str(number)))
+    def _running(self) -> str:
+        trial = self._context.session.trial
+        again = f", attempt {trial['attempt']}" if trial["attempt"] != 1 else ""
+        called = self._counts.name(int(str(trial["trial"])))
+        return f"{called[:1].upper()}{called[1:]}{again}"
 
     def _practice(self) -> str:
         trial = self._context.session.trial
@@ -159,23 +166,9 @@ class Snapshot:
             f"feedback {feedback}" if feedback else "",
         ]))  # fmt: skip
 
-    def _next(self) -> str:
-        session, plan = self._context.session, self._context.plan
-        if session.over:
-            return "nothing: the session has ended"
-        if session.trials_done < len(plan.trials):
-            running = session.trial.get("trial") if session.trial else None
-            left = [one for one in plan.trials[session.trials_done :] if one.number != running]
-            if left:
-                return self._called(left[0].number)
-        return "the end of the session" if plan.trials else "see the events"
-
     def _facts(self) -> list[str]:
         session, live = self._context.session, self._context.live
-        found = []
-        if session.trial:
-            found.append(f"attempt {session.trial['attempt']}")
-        found += [f"{name} {count}" for name, count in sorted(session.counts.items())]
+        found = [f"{name} {count}" for name, count in sorted(session.counts.items())]
         if live.lateness_s is not None:
             found.append(f"loop at most {1000 * live.lateness_s:.1f} ms late")
         return found
@@ -187,7 +180,7 @@ class Snapshot:
         )
         if state == "ended" or not trials:
             return "over" if state == "ended" else "-"
-        return f"{left / 60:.0f} min left" if left >= 60 else f"{left:.0f} s left"  # noqa: PLR2004
+        return f"{_long(left)} left"
 
     def _report(self) -> dict[str, Any] | None:
         ended = self._context.session.ended
@@ -220,29 +213,22 @@ class Snapshot:
             f"minute; a tick has {1000 * self._period_s:.1f} ms (dashed)"
         )
 
-    def _streams(self) -> list[tuple[str, dict[str, Any]]]:
+    def _streams(self) -> list[dict[str, Any]]:
+        """Return the streams, also of views and sounds; a view that shows too little says so."""
         session = self._context.session
-        return [
-            (
-                str(stream.get("name", "")),
-                _stream(stream, list(session.rates.get(stream["label"], ()))),
-            )
-            for stream in session.streams.get("streams", ())
-        ]
-
-    def _presented(self, streams: list[tuple[str, dict[str, Any]]]) -> list[dict[str, Any]]:
-        """Return the streams of views and sounds; a view that shows too little says so."""
-        wrong = shown_badly(self._context.session, self._expected)
-        return [
-            {**one, "level": "bad", "words": f"{one['words']}: {wrong[one['label']]}"}
-            if one["label"] in wrong
-            else one
-            for name, one in streams
-            if name.startswith(LOG)
-        ]
+        wrong, found = shown_badly(session, self._expected), []
+        for stream in session.streams.get("streams", ()):
+            one = _stream(stream, list(session.rates.get(stream["label"], ())))
+            if why := wrong.get(stream["label"]):
+                one |= {"level": "bad", "words": f"{one['words']}: {why}"}
+            found.append(one)
+        return found
 
     def _without_streams(self) -> str:
-        """Return the text for an empty list of external streams."""
+        """Return the text that is shown while no external stream has come."""
+        streams = self._context.session.streams.get("streams", ())
+        if any(not str(each.get("name", "")).startswith(LOG) for each in streams):
+            return ""
         asked = ", ".join(self._expected.streams)
         if asked:
             return f"Waiting for the study's streams: {asked}."
@@ -274,6 +260,11 @@ class Snapshot:
             "kind": said.kind, "level": said.level,
             "raw": f"{event.time:.3f}  {event.name}  {json.dumps(data, ensure_ascii=False)[:2000]}",
         }  # fmt: skip
+
+
+def _long(seconds: float) -> str:
+    """Return how long something takes, as people say it."""
+    return f"{seconds / 60:.0f} min" if seconds >= 60 else f"{seconds:.0f} s"  # noqa: PLR2004
 
 
 def clock(seconds: float) -> str:
