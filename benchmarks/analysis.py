@@ -10,12 +10,15 @@ whom libraries are loaded, from the others.
 """
 
 import argparse
+import json
 import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+
+import h5py
 
 from benchmarks.own_process import Use, used
 from benchmarks.table import Row
@@ -42,7 +45,14 @@ def multiply(recording: Path, folder: Path, count: int) -> Path:
     for number in range(1, count + 1):
         name = f"P{number:03}-SIMULATED"
         (folder / name).mkdir(parents=True)
-        shutil.copyfile(recording, folder / name / f"{name}.h5")
+        path = folder / name / f"{name}.h5"
+        shutil.copyfile(recording, path)
+        with h5py.File(path, "r+") as file:  # a copy that names another participant is left out
+            session = file["ses-01"]
+            context = json.loads(session["context"][()]) | {"participant": name}
+            del session["context"]
+            session["context"] = json.dumps(context).encode()
+            file.attrs["participant"] = session.attrs["participant"] = name
     return folder
 
 
