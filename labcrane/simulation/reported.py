@@ -19,12 +19,12 @@ from labcrane.analysis.report.factors import (
     GROUP,
     PHASE,
     PLACE,
+    SEQUENCE,
     SESSION,
     Factors,
     factors_of,
     with_factors,
 )
-from labcrane.analysis.report.outcomes import SEQUENCE
 from labcrane.analysis.statistics.anova import compare
 from labcrane.analysis.statistics.mixed import NoModelError, mixed_model
 from labcrane.analysis.statistics.trends import linear_trend
@@ -226,7 +226,7 @@ def names(planned: PlannedTest) -> list[str]:
         case "contrast":
             there = [*factors.between, *factors.over_phases, DISTANCE]
             there += [CONDITION] * bool(factors.conditions)
-            return [outcomes.named_factor(each, factors) for each in there if each in results]
+            return [factors.named(each) for each in there if each in results]
         case "trend":
             return [SEQUENCE]
     try:
@@ -238,7 +238,7 @@ def names(planned: PlannedTest) -> list[str]:
 
 def column(factor: str, factors: Factors) -> str:
     """Return the column of a factor that the report calls ``factor``."""
-    named = {outcomes.named_factor(name, factors): name for name in factors.over_phases}
+    named = {factors.named(name): name for name in factors.over_phases}
     return named.get(factor, factor)
 
 

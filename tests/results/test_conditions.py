@@ -100,7 +100,7 @@ def test_means_beside_the_test_of_conditions_are_without_the_period() -> None:
     movements = movements[movements["participant"].isin([f"P{n:03}" for n in (*range(12), 12, 14)])]
     factors = factors_of(movements)
     results = Results("", tested.COUNTS, factors, tested.every_finding(movements, factors))
-    (said,) = (text for text in _effects(movements, results) if text.startswith("Movement time"))
+    (said,) = (text for text in _effects(results) if text.startswith("Movement time"))
     found = re.search(r"over condition \(plain: ([\d.]+), tone: ([\d.]+); F\(1, 12\)", said)
     assert found
     plain, tone = map(float, found.groups())

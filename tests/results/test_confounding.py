@@ -73,18 +73,13 @@ def test_of_one_order_for_everybody_no_number_is_called_adjusted_or_an_effect_al
     )
     assert ": not tested, positions cannot be distinguished from pairs of targets." in said
     assert "Pairs of targets come in several orders" not in page
-    assert "The effect of sequence cannot be distinguished from pairs of targets" in page
-    assert (
-        "The effects of distance and far_side and distance:far_side cannot be distinguished from "
-        in page
-    )
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_answer_has_no_number_for_what_cannot_be_told_apart(found: Found, seed: int) -> None:
     table = in_orders(seed, 6, orders=1)
     results, _ = found(table)
-    (said,) = _effects(table, results)
+    (said,) = _effects(results)
     assert "F(" not in said
     assert "the effect of sequence cannot be distinguished from pairs of targets" in said
     assert "the effect of distance cannot be distinguished from positions" in said

@@ -56,7 +56,7 @@ def test_means_and_n_beside_a_test_are_of_those_who_were_tested(
 ) -> None:
     movements, stays = dropped
     results, _ = found(movements)
-    (said,) = _effects(movements, results)
+    (said,) = _effects(results)
     told = printed(said)
     assert {"group", "session", "distance", "far_side"} <= set(told)
     people = movements["participant"].nunique()
@@ -99,7 +99,7 @@ def test_what_is_printed_is_what_afex_says_of_the_same_rows(
 ) -> None:
     movements, stays = dropped
     results, _ = found(movements)
-    (said,) = _effects(movements, results)
+    (said,) = _effects(results)
     told = printed(said)
     own = with_factors(movements)
     own.to_csv(tmp_path / "rows.csv", index=False)
@@ -128,7 +128,7 @@ def test_means_of_groups_of_unequal_size_and_unlike_changes_are_those_of_emmeans
     for group, change in zip(groups, (1.12, 0.5), strict=True):
         movements.loc[later & (movements["group"] == group), "movement_time"] *= change
     results, _ = found(movements)
-    (said,) = _effects(movements, results)
+    (said,) = _effects(results)
     means, _ = printed(said)["session"]
     with_factors(movements).to_csv(tmp_path / "rows.csv", index=False)
     theirs = [float(value) for value in table(r(AFEX, tmp_path / "rows.csv"))["phase"][4:]]

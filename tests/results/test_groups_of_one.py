@@ -39,7 +39,7 @@ def test_who_is_alone_in_a_group_is_in_no_test_and_named_with_why(
     words = in_words(results)
     assert f": {said}." in words
     assert "F(1, 9) = " in words
-    (answer,) = _effects(table, results)
+    (answer,) = _effects(results)
     assert "n = 1:" not in answer
 
 

@@ -71,7 +71,7 @@ def test_groups_before_and_after_training_are_answered_by_their_interaction(
 ) -> None:
     table = trained(seed, gain)
     results, _ = found(table)
-    (said,) = _effects(table, results)
+    (said,) = _effects(results)
     first, *others = clauses(said)
     f, p = of_changes(table, "session")
     beginning = "showed an interaction of" if p < 0.05 else "showed no detectable interaction of"
@@ -104,7 +104,7 @@ def test_conditions_of_two_groups_are_answered_by_their_interaction(
     table = table.assign(group=group, movement_time=table["movement_time"] + effect * other)
     table = table.assign(attempt=1, started=0.0, ended=9.0, movement_onset=0.3)
     results, _ = found(table.drop(columns=["phase", "of_session", "of_block", "place"]))
-    (said,) = _effects(table, results)
+    (said,) = _effects(results)
     own = {
         re.search(r"(?:over|of) ([\w ]+?) \(", one).group(1): one
         for one in clauses(said)

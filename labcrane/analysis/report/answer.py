@@ -2,33 +2,25 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.presented import not_presented
 from labcrane.analysis.quality import is_result, without_onset
-from labcrane.analysis.report.factors import (
-    CONDITION,
-    DISTANCE,
-    GROUP,
-    PLACE,
-    SIDE,
-    Factors,
-    with_factors,
-)
+from labcrane.analysis.report.factors import GROUP, PLACE
 from labcrane.analysis.report.findings import Results, StudyFinding, people_in_words
-from labcrane.analysis.report.outcomes import SEQUENCE, named_factor, questions
 from labcrane.analysis.report.words import (
-    LOOKED,
     NAMES,
     STYLES,
     UNBALANCED,
+    UNTESTED,
     depends,
     f_test,
+    level,
     shortfalls,
     verdict,
 )
-from labcrane.analysis.statistics.anova import Anova, Contrast, marginal_means
+from labcrane.analysis.statistics.anova import Anova, Contrast, marginal_means, word
 from labcrane.analysis.statistics.trends import Trend
 
 if TYPE_CHECKING:
@@ -61,7 +53,7 @@ def answer(
     return {
         "Design": [_design(cohort, everything, results)],
         "Participants": [about, *_left_out(cohort), *_untested(results)],
-        "Effects": _effects(everything, results),
+        "Effects": _effects(results),
         "Data quality": list(_quality(*quality)),
         "Exclusions": [_exclusions(everything)],
     }
@@ -75,7 +67,7 @@ def _design(cohort: Cohort, everything: "pd.DataFrame", results: Results | None)
     if results is None:
         return f"{said}. No tests were made."
     factors = results.factors
-    within = [name for name, _, _ in _columns(factors) if name != GROUP]
+    within = [factors.named(name) for name in factors.tested if name != GROUP]
     absent = [name for name in factors.groups if name not in set(everything[GROUP])]
     empty = f"; {' and '.join(absent)} without movements" if absent else ""
     between = (
@@ -86,20 +78,6 @@ def _design(cohort: Cohort, everything: "pd.DataFrame", results: Results | None)
     merged = f" {UNBALANCED}." if factors.unbalanced else ""
     uneven = f" {factors.uneven}" if factors.uneven else ""
     return f"{said}. Within participants: {', '.join(within)}. {between}{merged}{uneven}"
-
-
-def _columns(factors: Factors) -> Iterator[tuple[str, str, str]]:
-    """Yield the name of each factor in the tests, its column, and the unit of its levels."""
-    if factors.groups:
-        yield GROUP, GROUP, ""
-    if factors.conditions:
-        yield CONDITION, CONDITION, ""
-    for name in factors.over_phases:
-        yield named_factor(name, factors), name, ""
-    for name, unit in ((DISTANCE, " m"), (SIDE, "")):
-        if name in factors.targets:
-            yield name, name, unit
-    yield SEQUENCE, PLACE, ""
 
 
 def _left_out(cohort: Cohort) -> list[str]:
@@ -123,33 +101,25 @@ def _untested(results: Results | None) -> list[str]:
     return [f"Not in every test, for the reasons given: {said}."]
 
 
-def _effects(everything: "pd.DataFrame", results: Results | None) -> list[str]:
+def _effects(results: Results | None) -> list[str]:
     if results is None:
         return []
-    whole = with_factors(everything)
-    counted = whole[is_result(whole)]
-    units = {columns: "" for _, columns in questions(results.factors)}
-    units |= {(column,): unit for _, column, unit in _columns(results.factors)}
+    factors = results.factors
+    asked = [*factors.questions.values(), *((column,) for column in factors.tested)]
     paragraphs = []
     for measure in results.measures("anova"):
-        if measure not in counted or measure.startswith(tuple(LOOKED)):
-            continue  # a questionnaire's, or of gaze
-        own = [one for one in results.findings if one.measure == measure]
-        others = depends(
-            [test for test in results.tests("anova") if test.measure == measure], results.factors
-        )
+        own = results.of(measure)
+        others = depends(own, factors)
         said = [
-            f"the effect of {one.effect} cannot be distinguished from {one.test.confounded}"
-            if one.test.confounded
-            else _effect(one, one.test, counted, unit, results) + others.get(one.effect, "")
-            for columns, unit in units.items()
+            _effect(one, one.test, results, others.get(one.effect, ""))
+            for columns in asked
             for one in own
             if one.table == "anova" and one.columns == columns and isinstance(one.test, Anova)
         ]
         # People missing from tests that the answer leaves out are named in the words.
-        short = shortfalls((one for one in own if one.columns in units or one.test is None), STYLE)
+        short = shortfalls((one for one in own if one.columns in asked or one.test is None), STYLE)
         if said or short:
-            effects = "; ".join(said) or "was not tested by an analysis of variance"
+            effects = "; ".join(said) or UNTESTED
             about = f"{NAMES.get(measure, measure)} {effects}."
             paragraphs.append(" ".join([*_standing(measure, results.primary), about, *short]))
     return paragraphs or [TESTED]
@@ -162,36 +132,29 @@ def _standing(measure: str, primary: Sequence[str]) -> list[str]:
     return ["Primary outcome:" if measure in primary else "Further outcome:"]
 
 
-def _effect(
-    finding: StudyFinding, test: Anova, counted: "pd.DataFrame", unit: str, results: Results
-) -> str:
+def _effect(finding: StudyFinding, test: Anova, results: Results, depending: str) -> str:
     """Return ``differed over distance (2 m: 3.21 s, 6 m: 5.40 s; F(1, 35) = 90.1, p < .001)``.
 
     The means are those that the test compares: of those who are in it, with equal weights of its
     design's cells and groups.
     """
-    plan, columns, measure = finding.plan, finding.columns, test.measure
+    if test.confounded:
+        return f"the effect of {finding.effect} cannot be distinguished from {test.confounded}"
+    columns, cells = finding.columns, finding.cells
     said, tested = verdict(test, STYLE), f_test(test, STYLE, results.people)
-    if plan.beside:  # the means are those of the plain test, before it
-        return f"{said} ({tested})"
-    means = list(
-        marginal_means(plan.cells(counted, measure, results.factors.between), columns).items()
-    )
+    if cells is None or finding.plan.beside:  # the means are those of the plain test, before it
+        return f"{said} ({tested}){depending}"
+    means = list(marginal_means(cells, columns).items())
     if columns == (PLACE,):  # the first and the last are enough
         means = [means[0], means[-1]]
     sizes = Counter(results.factors.people[who] for who in test.people)
     levels = ", ".join(
-        f"{_level(at, columns)}{unit}{f', n = {sizes[at[0]]}' if columns == (GROUP,) else ''}: "
-        f"{results.quantity(f'{mean:.3g}', measure)}"
+        " ".join(level(name, word(part)) for name, part in zip(columns, at, strict=True))
+        + (f", n = {sizes[at[0]]}" if columns == (GROUP,) else "")
+        + f": {results.quantity(f'{mean:.3g}', test.measure)}"
         for at, mean in means
     )
-    return f"{said} ({levels}; {tested})"
-
-
-def _level(at: Sequence[Any], columns: Sequence[str]) -> str:
-    """Return a level of a factor, or of several: ``position 3``, ``control 1 pre-test``."""
-    words = [f"{part:g}" if isinstance(part, float) else str(part) for part in at]
-    return " ".join([*(["position"] if columns == (PLACE,) else []), *words])
+    return f"{said} ({levels}; {tested}){depending}"
 
 
 def _quality(loops: "pd.DataFrame", syncs: "pd.DataFrame") -> Iterator[str]:

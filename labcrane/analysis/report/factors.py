@@ -13,6 +13,7 @@ GROUP, PHASE, PLACE = "group", "phase", "place"
 SESSION, BLOCK = "of_session", "of_block"
 DISTANCE, SIDE = "distance", "far_side"
 CONDITION = "condition"
+SEQUENCE = "sequence"
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +71,30 @@ class Factors:
     def by_phase(self) -> list[str]:
         """The column that distinguishes phases, where there are several."""
         return [PHASE] if len(self.phases) > 1 else []
+
+    @property
+    def tested(self) -> list[str]:
+        """Columns of what tests are over, between participants first and positions last."""
+        conditions = [CONDITION] if self.conditions else []
+        return [*self.between, *conditions, *self.over_phases, *self.targets, PLACE]
+
+    @property
+    def questions(self) -> dict[str, tuple[str, ...]]:
+        """The interactions that the design asks about, by name, with their columns.
+
+        With groups, whether what varies within people has another effect in each of them.
+        """
+        phases = tuple(self.over_phases)
+        within: list[tuple[str, ...]] = [(CONDITION,)] if self.conditions else []
+        within += [*((name,) for name in phases), *([phases] if len(phases) > 1 else [])]
+        asked = [(GROUP, *columns) for columns in within if self.groups]
+        return {self.named(":".join(columns)): columns for columns in asked}
+
+    def named(self, effect: str) -> str:
+        """Return the name of a column, or of several with colons, as the tables have it."""
+        words = {PHASE: self.kind, PLACE: SEQUENCE, SESSION: "session", BLOCK: "block"}
+        columns, separator, rest = effect.partition(" ")
+        return ":".join(words.get(one, one) for one in columns.split(":")) + separator + rest
 
     @property
     def unbalanced(self) -> bool:

@@ -9,14 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.presented import not_presented
 from labcrane.analysis.quality import is_success
-from labcrane.analysis.report.factors import CONDITION, DISTANCE, GROUP, PHASE, PLACE, Factors
+from labcrane.analysis.report.factors import (
+    CONDITION,
+    DISTANCE,
+    GROUP,
+    PHASE,
+    PLACE,
+    SEQUENCE,
+    Factors,
+)
 from labcrane.analysis.report.outcomes import (
     ADJUSTED,
     ORDER,
     PRACTICE,
     SCORE_CONDITIONS,
     SCORE_OCCASIONS,
-    SEQUENCE,
     Plan,
     StudyMovements,
     Test,
@@ -24,13 +31,11 @@ from labcrane.analysis.report.outcomes import (
     between_phases,
     contrasts,
     measures_in,
-    named_factor,
     occasions,
     of_gaze,
     plans,
     practice_words,
     practised,
-    questions,
     row_of,
     trend_confounded,
 )
@@ -104,6 +109,8 @@ class StudyFinding:
         Columns of the effect of an analysis of variance.
     plan
         The analysis of variance that the effect is part of.
+    cells
+        The participants' means in its cells; None of other tests.
     """
 
     table: str
@@ -113,6 +120,7 @@ class StudyFinding:
     short: tuple[Shortfall, ...] = ()
     columns: tuple[str, ...] = ()
     plan: Plan = NO_PLAN
+    cells: FactorialDesign | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,9 +161,12 @@ class Results:
         return [test for test in found if isinstance(test, Anova)]
 
     def measures(self, *tables: str) -> list[str]:
-        """Return the measures with a test in some tables, and then those that lack any test."""
-        short = [one.measure for one in self.findings if one.short]
-        return list(dict.fromkeys([*(test.measure for test in self.tests(*tables)), *short]))
+        """Return the measures whose tests were planned in some of the report's tables."""
+        return list(dict.fromkeys(one.measure for one in self.findings if one.table in tables))
+
+    def of(self, measure: str) -> list[StudyFinding]:
+        """Return the findings of a measure."""
+        return [one for one in self.findings if one.measure == measure]
 
     def in_positions(self, results: "pd.DataFrame", measure: str) -> "pd.DataFrame":
         """Return the movements of those who are in a test over positions; empty if none is."""
@@ -368,9 +379,11 @@ class _PlanRun:
     def findings(self) -> Iterator[StudyFinding]:
         """Yield the tests that can be made, and then those that cannot."""
         plan, cells = self.plan, self._cells
-        finding = partial(StudyFinding, self.table, self.measure, plan=plan)
+        finding = partial(StudyFinding, self.table, self.measure, plan=plan, cells=cells)
         planned = [columns for columns in plan.effects if set(columns) <= set(self._levels)]
-        asked = [columns for _, columns in questions(self.factors) if columns[1:] == plan.within]
+        asked = [
+            columns for columns in self.factors.questions.values() if columns[1:] == plan.within
+        ]
         tests = {tuple(test.factor.split(":")): test for test in plan.tests(cells, self.measure)}
         for columns, test in tests.items():
             name, confounded = self._name(columns), ""
@@ -387,10 +400,10 @@ class _PlanRun:
                 yield finding(self._name(columns), None, (no_test,), columns)
 
     def _name(self, columns: tuple[str, ...]) -> str:
-        return named_factor(":".join(columns), self.factors) + self.plan.suffix
+        return self.factors.named(":".join(columns)) + self.plan.suffix
 
     def _word(self, column: str) -> str:
-        return named_factor(column, self.factors)
+        return self.factors.named(column)
 
     def _gone(self, column: str) -> list[Any]:
         """Return the planned levels of a factor within participants without any value."""

@@ -45,7 +45,6 @@ TO_REST = "onset_to_rest"
 ADJUSTED = f" with {TAKEN}"
 """Suffix of an effect of positions that was adjusted for pairs of targets."""
 
-SEQUENCE = "sequence"
 OCCASION = "occasion"
 PRACTICE = "practice"
 
@@ -216,28 +215,6 @@ def rests_apart(results: "pd.DataFrame") -> bool:
     return bool(apart.any())
 
 
-def named_factor(name: str, factors: Factors) -> str:
-    """Return the name of a factor, or of several with colons, as the tables have it."""
-    words = {PHASE: factors.kind, PLACE: SEQUENCE, SESSION: "session", BLOCK: "block"}
-    effect, separator, rest = name.partition(" ")
-    return ":".join(words.get(part, part) for part in effect.split(":")) + separator + rest
-
-
-def questions(factors: Factors) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
-    """Return the interactions that the design asks about, by names and columns.
-
-    With groups, whether what varies within people has another effect in each of them.
-    """
-    phases = tuple(factors.over_phases)
-    within: list[tuple[str, ...]] = [(CONDITION,)] if factors.conditions else []
-    within += [*((name,) for name in phases), *([phases] if len(phases) > 1 else [])]
-    return [
-        ((GROUP, *(named_factor(name, factors) for name in columns)), (GROUP, *columns))
-        for columns in within
-        if factors.groups
-    ]
-
-
 def plans(results: "pd.DataFrame", factors: Factors) -> Iterator[Plan]:
     """Yield the plans of every outcome."""
     phases = tuple(factors.over_phases)
@@ -269,7 +246,7 @@ def tests(results: "pd.DataFrame", measure: str, factors: Factors) -> Iterator[A
     """Yield the tests of an outcome, with their effects named as in the tables."""
     for plan in plans(results, factors):
         for test in plan.tests(plan.cells(results, measure, factors.between), measure):
-            yield replace(test, factor=named_factor(test.factor + plan.suffix, factors))
+            yield replace(test, factor=factors.named(test.factor + plan.suffix))
 
 
 def practised(everything: "pd.DataFrame") -> "pd.DataFrame":
@@ -305,7 +282,7 @@ def contrasts(study: StudyMovements) -> list[Contrast]:
             own = CONDITIONS.of(results)
             asked = compare(own, measure, CONDITION, (CONDITION,), between, period=PHASE)
             found += [replace(one, confounded="" if one.beside else ORDER) for one in asked]
-    return [replace(one, factor=named_factor(one.factor, factors)) for one in found]
+    return [replace(one, factor=factors.named(one.factor)) for one in found]
 
 
 def _of_phases(results: "pd.DataFrame", one: Contrast, name: str) -> str:

@@ -45,7 +45,7 @@ from labcrane.analysis.report.protocols import in_words as protocols_in_words
 from labcrane.analysis.report.protocols import unlike_protocols
 from labcrane.analysis.report.sample import in_words, sample
 from labcrane.analysis.report.thresholds import Judge, add_thresholds, thresholds_of
-from labcrane.analysis.report.words import STYLES, UNBALANCED, confounding, paragraphs
+from labcrane.analysis.report.words import STYLES, paragraphs
 from labcrane.analysis.statistics.errors import errors
 from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
@@ -412,21 +412,11 @@ def _rests(results: "pd.DataFrame") -> str:
 
 def _statistics(page: Page, found: Results, measures: Sequence[str]) -> None:
     """Add the tests of effects, contrasts, trends, time scales and practice."""
-    factors, anovas = found.factors, found.tests("anova")
+    anovas = found.tests("anova")
     page.heading("Statistics")
-    varies = [CONDITION] * bool(factors.conditions)
-    varies += [outcomes.named_factor(name, factors) for name in factors.over_phases]
-    page.say(
-        f"Within participants: {', '.join([*varies, outcomes.SEQUENCE, *factors.targets])}. Groups "
-        f"between participants: {', '.join(factors.groups) or 'none'}. A sequence starts "
-        "again with each session or block."
-    )
-    if factors.unbalanced:
-        page.say(f"{UNBALANCED}.")
+    page.say("A sequence starts again with each session or block.")
     page.say(_of_primary(found.primary, measures))
-    if not anovas:
-        page.say("Tests need three or more participants with a value in every cell.")
-    else:
+    if anovas:
         page.say(
             "Analysis of variance over participants' means (type III); p_gg is corrected after "
             "Greenhouse and Geisser. It shows that some levels differ, not in which direction."
@@ -442,8 +432,6 @@ def _statistics(page: Page, found: Results, measures: Sequence[str]) -> None:
                 "Conditions are compared with the period taken out: what changes from block to "
                 "block is estimated, the same in all participants, and in no difference of them."
             )
-        for note in confounding(anovas):
-            page.say(note)
         page.table("anova", found.table("anova"))
     scales = (
         "Two time scales: within a session or block, and from one to the next. Where adjustment "

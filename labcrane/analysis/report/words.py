@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from labcrane.analysis.report.factors import DISTANCE, GROUP, PHASE, Factors
+from labcrane.analysis.report.factors import DISTANCE, GROUP, PHASE, PLACE, Factors
 from labcrane.analysis.report.findings import Results, StudyFinding, lacking
-from labcrane.analysis.report.outcomes import OCCASION, questions
+from labcrane.analysis.report.outcomes import OCCASION, Test
 from labcrane.analysis.statistics.anova import Anova, Contrast
 from labcrane.analysis.statistics.trends import Trend
 
@@ -33,10 +33,15 @@ LOOKED = {
     "dwell_during_": "How long {} was looked at during movements",
     "look_lead_": "How long before onset {} was looked at first",
 }
+ANALYSES = ("anova", "gaze_tests", "score_tests")
+"""Tables of analyses of variance whose tests are in the words."""
+
 SMALLEST = 0.001
 
 ROUNDING = 1e-9
 """Share of an interval; a smaller estimate is what rounding leaves of zero."""
+
+UNTESTED = "was not tested by an analysis of variance"
 
 UNBALANCED = (
     "Sessions do not have the same blocks: each block of each session is a level of one factor, "
@@ -108,31 +113,37 @@ def paragraphs(results: Results, style: Style) -> list[str]:
         found[0] += f" {UNBALANCED}."
     if results.factors.uneven:
         found[0] += f" {style.plain(results.factors.uneven)}"
-    tables = ("anova", "gaze_tests", "score_tests")
-    asked = [":".join(names) for names, _ in questions(results.factors)]
-    for measure in results.measures(*tables):
-        own = [one for one in results.findings if one.measure == measure]
-        effects = [test for test in results.tests(*tables) if test.measure == measure]
-        effects.sort(key=lambda test: test.factor not in asked)
+    asked = results.factors.questions
+    for measure in results.measures(*ANALYSES):
+        own = results.of(measure)
         name = style.plain(NAMES.get(measure, _looked(measure)))
-        others = depends(effects, results.factors)
+        others = depends(own, results.factors)
         sentences = [
-            _effect(test, style, results.people) + style.plain(others.get(test.factor, ""))
-            for test in effects
+            _effect(one.test, style, results.people) + style.plain(others.get(one.effect, ""))
+            for one in sorted(own, key=lambda one: one.effect not in asked)
+            if one.table in ANALYSES and isinstance(one.test, Anova)
         ]
-        text = "; ".join(sentences) or "was not tested by an analysis of variance"
-        more = shortfalls(own, style)
-        more += [_trend(one.test, style, results) for one in own if isinstance(one.test, Trend)]
-        more += [
-            _scale(one.test, style, results)
+        more = [
+            said
+            for table in ("trends", "time_scales", "contrasts")
             for one in own
-            if one.table == "time_scales" and isinstance(one.test, Mapping)
+            if one.table == table and (said := _sentence(one.test, style, results))
         ]
-        more += [
-            _contrast(one.test, style, results) for one in own if isinstance(one.test, Contrast)
-        ]
-        found.append(" ".join([f"{name} {text}.", *filter(None, more)]))
+        text = "; ".join(sentences) or UNTESTED
+        found.append(" ".join([f"{name} {text}.", *shortfalls(own, style), *more]))
     return found
+
+
+def _sentence(test: Test | None, style: Style, results: Results) -> str:
+    """Return a test that is not an analysis of variance in a sentence; empty if there is none."""
+    match test:
+        case Trend():
+            return _trend(test, style, results)
+        case Contrast():
+            return _contrast(test, style, results)
+        case Mapping():
+            return _scale(test, style, results)
+    return ""
 
 
 def shortfalls(findings: Iterable[StudyFinding], style: Style) -> list[str]:
@@ -226,16 +237,23 @@ def verdict(test: Anova, style: Style) -> str:
     return f"{'differed' if test.p_gg < LEVEL else 'did not detectably differ'} over {names}"
 
 
-def depends(tests: Iterable[Anova], factors: Factors) -> dict[str, str]:
+def level(column: str, name: str) -> str:
+    """Return a level of a factor as sentences name it: ``position 3``, ``2 m``."""
+    return f"position {name}" if column == PLACE else f"{name} m" if column == DISTANCE else name
+
+
+def depends(findings: Iterable[StudyFinding], factors: Factors) -> dict[str, str]:
     """Return what to add to each main effect whose factor is in an interaction that was found.
 
     Of the interactions that the design asks about only: among all, some would be found by chance.
     """
-    asked = {":".join(names): names for names, _ in questions(factors)}
     others: dict[str, list[str]] = {}
-    for test in tests:
-        if test.factor in asked and test.p_gg < LEVEL and not test.confounded:
-            parts = asked[test.factor]
+    for one in findings:
+        test = one.test
+        if one.table not in ANALYSES or one.effect not in factors.questions:
+            continue
+        if isinstance(test, Anova) and test.p_gg < LEVEL and not test.confounded:
+            parts = one.effect.split(":")
             for part in parts:
                 others.setdefault(part, []).extend(other for other in parts if other != part)
     return {
@@ -299,10 +317,8 @@ def _contrast(one: Contrast, style: Style, results: Results) -> str:
         return ""  # all are alike
     at = f" in {style.plain(one.at)}" if one.at else ""
     at += _confounded(one.confounded)
-    first, second = style.plain(one.first), style.plain(one.second)
+    first, second = (style.plain(level(one.factor, name)) for name in (one.first, one.second))
     difference = results.quantity(_number(one.difference, style), one.measure)
-    if one.factor == DISTANCE:
-        first, second = f"{first} m", f"{second} m"
     low, high = _number(one.ci_low, style), _number(one.ci_high, style)
     return (
         f"{first} minus {second}{at}: {difference}, "
@@ -315,19 +331,6 @@ def _contrast(one: Contrast, style: Style, results: Results) -> str:
 def _confounded(words: str) -> str:
     """Return `` (cannot be distinguished from positions)`` where an effect is confounded."""
     return f" (cannot be distinguished from {words})" if words else ""
-
-
-def confounding(tests: Iterable[Anova]) -> list[str]:
-    """Return a sentence for each confound that factors cannot be distinguished from."""
-    factors: dict[str, dict[str, None]] = {}
-    for test in tests:
-        if test.confounded:
-            factors.setdefault(test.confounded, {})[test.factor] = None
-    return [
-        f"The effect{'s' * (len(own) > 1)} of {' and '.join(own)} cannot be "
-        f"distinguished from {words}: in these orders, either may have caused the difference."
-        for words, own in sorted(factors.items())
-    ]
 
 
 def _t(t: float, df: float, p: float, style: Style) -> str:
