@@ -271,9 +271,10 @@ def test_a_score_is_tested_over_conditions_with_the_occasion_taken_out() -> None
     row = tests.loc["condition"]
     assert (row["f"], row["p"]) == pytest.approx((theirs.statistic**2, theirs.pvalue))
     assert (row["n"], row["left_out"], row["confounded"]) == (12, "P003", "")
-    table = outcomes.condition_scores(scores, people).set_index("condition")
-    assert set(table["n"]) == {12}
-    np.testing.assert_allclose(table["mean"], means.mean())
+    table = outcomes.score_table(scores, people, "condition").set_index("condition")
+    assert table["n"].to_dict() == {"plain": 13, "tone": 12}
+    assert set(table["n_tested"]) == {12}
+    np.testing.assert_allclose(table["mean_tested"], means.mean())
     alike = crossover(3, 13, ("plain", "tone"), balanced=False)
     scores = outcomes.with_conditions(asked_after(alike, 4), alike)
     tests = tested.score_tests(scores, people).set_index("factor")["confounded"]
@@ -300,7 +301,7 @@ def test_a_score_that_was_asked_once_at_the_end_is_not_tested_over_conditions() 
     scores = outcomes.with_conditions(asked_after(movements, 4), movements)
     scores = scores[scores["step"] == 5.0]
     assert tested.score_tests(scores, people).empty
-    assert outcomes.condition_scores(scores, people).empty
+    assert outcomes.score_table(scores, people, "condition").empty
 
 
 @pytest.mark.parametrize("people", range(4, 13))

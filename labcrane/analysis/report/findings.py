@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from labcrane.analysis.presented import not_presented
 from labcrane.analysis.quality import is_success
 from labcrane.analysis.report.factors import (
-    CONDITION,
     DISTANCE,
     GROUP,
     PHASE,
@@ -29,15 +28,16 @@ from labcrane.analysis.report.outcomes import (
     Test,
     after_conditions,
     between_phases,
+    confounds,
     contrasts,
     measures_in,
     occasions,
     of_gaze,
+    of_pairs,
     plans,
     practice_words,
     practised,
     row_of,
-    trend_confounded,
 )
 from labcrane.analysis.statistics.anova import (
     LEAST,
@@ -260,9 +260,7 @@ def of_scores(scores: "pd.DataFrame", factors: Factors) -> Iterator[StudyFinding
         name = str(outcome)
         table = own.rename(columns={"value": name})
         yield from _PlanRun("score_tests", SCORE_OCCASIONS, name, table, table, factors).findings()
-        behind = after_conditions(table)
-        each = behind.groupby("participant")[CONDITION].nunique()
-        if each.max() > 1:  # else it was asked after one of them
+        if len(behind := after_conditions(table)):
             run = _PlanRun("score_tests", SCORE_CONDITIONS, name, behind, behind, factors)
             yield from run.findings()
 
@@ -294,7 +292,7 @@ def _of_trend(study: StudyMovements, measure: str, phase: str) -> StudyFinding:
         why += f", and {LEAST} are needed" if few else ", whose slopes do not differ"
         short = Shortfall("", len(people), len(several), why)
         return StudyFinding("trends", measure, name, None, (short,))
-    confounded = trend_confounded(study.results, measure, phase, trend.people)
+    confounded = confounds(own, measure, trend.people, (PLACE,), of_pairs(study.results))
     there = set(study.recorded.loc[study.recorded[PHASE] == phase, "participant"])
     why_not = {True: "values at fewer than two positions", False: f"{NOTHING} in {phase}"}
     reasons = {who: why_not[who in there] for who in people if who not in trend.people}

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.report.figures import Drawing
-from labcrane.analysis.report.panels import svg_of
 from labcrane.analysis.report.style import save
 from labcrane.files.html import rendered
 
@@ -32,7 +31,7 @@ class Page:
     root
         Folder of the report.
     prefix
-        Put before the names of pictures and tables: the participant, on their page.
+        Put before the names of tables: the participant, on their page.
     footer
         Label below every figure and above every text, which may leave the page: ``SIMULATED``.
     """
@@ -93,33 +92,17 @@ class Page:
         self.links({name: f"{self._up}{name}"})
 
     def draw(self, drawing: Drawing) -> None:
-        """Add a figure by Matplotlib, as SVG, PNG and PDF, and its table as CSV."""
-        figure = drawing.figure
-        save(figure, self._figure(drawing), self._footer)
-        self._show(drawing, ("svg", "png", "pdf"), _size(figure))
-
-    def sketch(self, drawing: Drawing) -> None:
-        """Add a figure as plain SVG, and write its table as CSV; a hundred times as fast."""
-        self._figure(drawing).with_suffix(".svg").write_text(
-            svg_of(drawing.panels, self._footer), encoding="utf-8"
-        )
-        self._show(drawing, ("svg",))
-
-    def _figure(self, drawing: Drawing) -> Path:
-        folder = self._root / "figures"
+        """Add a figure as SVG, PNG and PDF, and its table as CSV."""
+        figure, folder = drawing.figure, self._root / "figures"
         folder.mkdir(exist_ok=True)
-        return folder / f"{self._prefix}{drawing.name}"
-
-    def _show(
-        self, drawing: Drawing, forms: Sequence[str], size: tuple[int, int] | None = None
-    ) -> None:
+        save(figure, folder / drawing.name, self._footer)
         self._add(
             "figure",
             caption=drawing.caption,
-            picture=f"{self._up}figures/{self._prefix}{drawing.name}",
+            picture=f"{self._up}figures/{drawing.name}",
             csv=self._csv(drawing.name, drawing.table),
-            forms=forms,
-            size=size,
+            forms=("svg", "png", "pdf"),
+            size=_size(figure),
             whole=len(drawing.panels) > 1,
         )
 

@@ -141,29 +141,39 @@ class Plan:
         people: Collection[str],
         effect: Sequence[str] = (),
     ) -> str:
-        """Return the confounds of an effect in those who are in its test; empty if none.
+        """Return the confounds of an effect, by default the requested one; empty if none."""
+        return confounds(self.of(results), measure, people, effect or self.asked, self.confusable)
 
-        Parameters
-        ----------
-        people
-            Who is in the test: the orders of others could remove the confound.
-        effect
-            Its columns; by default the requested ones.
-        """
-        known = self.of(results).dropna(subset=[measure])
-        known = known[known["participant"].isin(people)]
-        effect = effect or self.asked
-        # A session, block or condition is all of a participant's phase: it is told from what comes
-        # with it over participants.
-        person = ("participant",) if set(effect) <= OF_PHASES else ("participant", PHASE)
-        found = [
-            words
-            for words, columns in self.confusable
-            if set(columns) <= set(known)
-            and not set(columns) & set(effect)
-            and not told_apart(known, effect, [person, columns])
-        ]
-        return " and ".join(found)
+
+def confounds(
+    rows: "pd.DataFrame",
+    measure: str,
+    people: Collection[str],
+    effect: Sequence[str],
+    confusable: Confusable,
+) -> str:
+    """Return what an effect cannot be distinguished from in those who are in its test.
+
+    Parameters
+    ----------
+    people
+        Who is in the test: the orders of others could remove the confound.
+    effect
+        Its columns.
+    """
+    known = rows.dropna(subset=[measure])
+    known = known[known["participant"].isin(people)]
+    # A session, block or condition is all of a participant's phase: it is told from what comes
+    # with it over participants.
+    person = ("participant",) if set(effect) <= OF_PHASES else ("participant", PHASE)
+    found = [
+        words
+        for words, columns in confusable
+        if set(columns) <= set(known)
+        and not set(columns) & set(effect)
+        and not told_apart(known, effect, [person, columns])
+    ]
+    return " and ".join(found)
 
 
 CONDITIONS = Plan((CONDITION,), (CONDITION,), period=PHASE)
@@ -219,12 +229,12 @@ def plans(results: "pd.DataFrame", factors: Factors) -> Iterator[Plan]:
     """Yield the plans of every outcome."""
     phases = tuple(factors.over_phases)
     pair = pair_of(results)
+    confusable = of_pairs(results)
     # First, because most participants are whole there.
     yield Plan(phases, confusable=BESIDE_PHASES)
     if factors.conditions:
         yield CONDITIONS
     # Positions of phases of unequal length have nothing to do with each other.
-    confusable = ((PAIRS, (pair,)),) if pair else ()
     for phase in ("",) if factors.alike else factors.phases:
         within = (PLACE,) if phase else (*phases, PLACE)
         yield Plan(within, (PLACE,), phase=phase, confusable=confusable)
@@ -240,6 +250,12 @@ def plans(results: "pd.DataFrame", factors: Factors) -> Iterator[Plan]:
 def pair_of(results: "pd.DataFrame") -> str:
     """Return the column that identifies pairs of targets; empty if there is none."""
     return next((name for name in ("pair", DISTANCE) if name in results), "")
+
+
+def of_pairs(results: "pd.DataFrame") -> Confusable:
+    """Return the possible confounds of positions: pairs of targets, where there are any."""
+    pair = pair_of(results)
+    return ((PAIRS, (pair,)),) if pair else ()
 
 
 def tests(results: "pd.DataFrame", measure: str, factors: Factors) -> Iterator[Anova]:
@@ -273,31 +289,18 @@ def contrasts(study: StudyMovements) -> list[Contrast]:
             for other in phases:
                 if other != name:
                     of_phases += compare(results, measure, name, phases, between, at=other)
-            found += [replace(one, confounded=_of_phases(results, one, name)) for one in of_phases]
-        plan = Plan((*phases, DISTANCE), (DISTANCE,), confusable=POSITIONS)
-        for one in compare(results, measure, DISTANCE, plan.within, between):
-            confounded = plan.confounded(results, measure, one.people)
+            for one in of_phases:
+                two = results[results[name].isin([one.first, one.second])]
+                confounded = confounds(two, measure, one.people, (name,), BESIDE_PHASES)
+                found.append(replace(one, confounded=confounded))
+        for one in compare(results, measure, DISTANCE, (*phases, DISTANCE), between):
+            confounded = confounds(results, measure, one.people, (DISTANCE,), POSITIONS)
             found.append(replace(one, confounded=confounded))
         if factors.conditions:
             own = CONDITIONS.of(results)
             asked = compare(own, measure, CONDITION, (CONDITION,), between, period=PHASE)
             found += [replace(one, confounded="" if one.beside else ORDER) for one in asked]
     return [replace(one, factor=factors.named(one.factor)) for one in found]
-
-
-def _of_phases(results: "pd.DataFrame", one: Contrast, name: str) -> str:
-    """Return the confounds of a difference of two sessions or blocks; empty if none."""
-    two = results[results[name].isin([one.first, one.second])]
-    return Plan((), (name,), confusable=BESIDE_PHASES).confounded(two, one.measure, one.people)
-
-
-def trend_confounded(
-    results: "pd.DataFrame", measure: str, phase: str, people: Collection[str]
-) -> str:
-    """Return the confounds of a phase's positions in some people; empty if none."""
-    pair = pair_of(results)
-    plan = Plan((PLACE,), (PLACE,), phase=phase, confusable=((PAIRS, (pair,)),) if pair else ())
-    return plan.confounded(results, measure, people)
 
 
 def between_phases(
@@ -319,24 +322,28 @@ def between_phases(
     if row["group"] != "all":
         own = own[own["group"] == row["group"]]
     two = results[results[PHASE].isin(factors.phases[at - 1 : at + 1])]
-    plan = Plan((), (PHASE,), confusable=BESIDE_PHASES)
-    return plan.confounded(two, str(row["measure"]), set(own["participant"]))
+    people = set(own["participant"])
+    return confounds(two, str(row["measure"]), people, (PHASE,), BESIDE_PHASES)
 
 
-def score_table(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
-    """Return means and spreads of every score, by group and occasion.
+def score_table(
+    scores: "pd.DataFrame", groups: dict[str, str], over: str = OCCASION
+) -> "pd.DataFrame":
+    """Return means and spreads of every score, by group and occasion, or condition before it.
 
-    Values of the tested participants, who have one on every occasion, are next to those of all.
+    Values of the tested participants, who have one at every level, are next to those of all.
     """
     import pandas as pd
 
     own = occasions(scores, groups).dropna(subset=["value"])
+    if over == CONDITION:
+        own = after_conditions(own)
     if own.empty:
         return pd.DataFrame()
-    by = ["outcome", GROUP, "occasion"]
+    by = ["outcome", GROUP, over]
     each = own.groupby([*by, "participant"])["value"].mean()
     had = each.groupby(level=["outcome", "participant"]).transform("size")
-    planned = own.groupby("outcome")["occasion"].nunique().loc[each.index.get_level_values(0)]
+    planned = own.groupby("outcome")[over].nunique().loc[each.index.get_level_values(0)]
     whole = each[had.to_numpy() == planned.to_numpy()]
     table = pd.DataFrame(
         {
@@ -365,7 +372,7 @@ def with_conditions(scores: "pd.DataFrame", movements: "pd.DataFrame") -> "pd.Da
 
 
 def after_conditions(scores: "pd.DataFrame") -> "pd.DataFrame":
-    """Return the scores of questionnaires that were asked after blocks of conditions.
+    """Return the scores of questionnaires that were asked after blocks of several conditions.
 
     Of one that was asked several times after a block, the first counts: the last may be about the
     whole session.
@@ -374,23 +381,9 @@ def after_conditions(scores: "pd.DataFrame") -> "pd.DataFrame":
         return scores.iloc[:0].assign(condition="")
     own = scores[scores[CONDITION] != ""]
     first = own.groupby(["participant", "session", "block", "outcome"])["step"].transform("min")
-    return own[own["step"] == first]
-
-
-def condition_scores(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
-    """Return means and spreads of every score by group and condition; empty where there are none.
-
-    Of those who have a value in every condition, who are tested.
-    """
-    own = after_conditions(occasions(scores, groups)).dropna(subset=["value"])
-    each = own.groupby(["outcome", GROUP, CONDITION, "participant"])["value"].mean()
-    had = each.groupby(level=["outcome", "participant"]).transform("size")
-    planned = own.groupby("outcome")[CONDITION].nunique()
-    there = planned.loc[each.index.get_level_values("outcome")].to_numpy()
-    whole = each[(had.to_numpy() == there) & (there > 1)]
-    cells = whole.groupby(level=["outcome", GROUP, CONDITION])
-    table: pd.DataFrame = cells.agg(["count", "mean", "std"])
-    return table.rename(columns={"count": "n", "std": "sd"}).reset_index()
+    own = own[own["step"] == first]
+    each = own.groupby(["outcome", "participant"])[CONDITION].nunique()
+    return own[own["outcome"].map(each.groupby(level=0).max()) > 1]
 
 
 def occasions(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":

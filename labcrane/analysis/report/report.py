@@ -331,8 +331,8 @@ def _study(
         page.table("scores", outcomes.score_table(scores, groups))
         page.rows(
             "scores_by_condition",
-            outcomes.condition_scores(scores, groups),
-            "By condition, for participants who answered after each of them:",
+            outcomes.score_table(scores, groups, CONDITION),
+            "By condition; columns of those tested are of participants who answered after each:",
         )
         page.table("score_tests", found.table("score_tests"))
     page.heading("What was not tested")
@@ -615,16 +615,7 @@ def _participant_page(participant: Participant, tables: PersonTables, folder: Pa
     page.say(participant.why)
     results = own[is_result(own)]
     if _is_aiming(results):
-        whole = with_factors(own)
-        results = running(whole[is_result(own)], factors_of(whole))
-        curves = learning_curves(results.assign(sequence=results[PLACE]), "movement_time")
-        if len(curves):
-            page.sketch(figures.learning(results, curves, "movement_time"))
-        page.sketch(figures.by_distance(results))
-        page.sketch(figures.fitts(results))
-        if results["simultaneous"].notna().any():
-            page.sketch(figures.sticks(results))
-        page.table("movements", results[["trial", "sequence", "distance", *SHOWN]])
+        page.table("movements", results[["session", "trial", "sequence", "distance", *SHOWN]])
     page.heading("Exclusions")
     page.table("excluded_movements", exclusions(own))
     page.rows(
