@@ -1,12 +1,13 @@
 """Every column of a participant's tables, with its unit and its source."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.gaze import FIXATIONS, gaze_units
 from labcrane.analysis.presented import PRESENTED
-from labcrane.analysis.questionnaires import ANSWERS, MEANING, SCORES, asked_in, score_column
+from labcrane.analysis.questionnaires import ANSWERS, MEANING, SCORES, score_column
+from labcrane.analysis.statistics.mixed import TIMES
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.core.items import Item
 from labcrane.files.yaml import parse_yaml
@@ -39,19 +40,33 @@ EVENTS: Mapping[str, tuple[str, str]] = {
 MEASURED, WRITTEN = "computed from the frames by labcrane", "recorded by the session"
 
 
+Row = tuple[str, str, str, str, str]
+COLUMNS = ("table", "column", "unit", "description", "source")
+
+
 def codebook_of(participant: Participant, measures: "pd.DataFrame") -> "pd.DataFrame":
     """Return unit, meaning and source of every column of ``measures`` and of all streams."""
     import pandas as pd
 
     sessions = [session for _, session in participant.sessions()]
-    tables = [
-        trial_codebook(measures, sessions[0], sessions),
-        event_codebook(),
-        questionnaire_codebook(sessions),
-        fixation_codebook(),
-        *map(stream_codebook, sessions),
+    contexts = [session.context for session in sessions]
+    who = {name: ("", IDENTITY[name]) for name in IDENTITY}
+    fixations = {"participant": who["participant"], "session": who["session"], **FIXATIONS}
+    rows = [
+        *_of_trials(measures, contexts),
+        *_described("events", EVENTS, WRITTEN),
+        *_described("questionnaires", {name: (who | MEANING)[name] for name in ANSWERS}, WRITTEN),
+        *_described("scores", {name: (who | MEANING)[name] for name in SCORES}, WRITTEN),
     ]
-    return pd.concat(tables).drop_duplicates(["table", "column"], ignore_index=True)
+    for name, items, scores in _asked(contexts):
+        for table, columns in (("questionnaires.item", items), ("scores.score", scores)):
+            about = {f"{name}.{column}": ("", meaning) for column, meaning in columns.items()}
+            rows += _described(table, about, WRITTEN)
+    rows += _described("fixations", fixations, MEASURED)
+    for session in sessions:
+        rows += _of_streams(session)
+    book = pd.DataFrame(rows, columns=list(COLUMNS))
+    return book.drop_duplicates(["table", "column"], ignore_index=True)
 
 
 def levels_of(participant: Participant) -> dict[str, tuple[str, ...]]:
@@ -76,115 +91,74 @@ def levels_of(participant: Participant) -> dict[str, tuple[str, ...]]:
 
 
 def trial_codebook(
-    measures: "pd.DataFrame", session: SessionRecord, sessions: Sequence[SessionRecord] = ()
+    measures: "pd.DataFrame", contexts: Sequence[Mapping[str, Any]]
 ) -> "pd.DataFrame":
     """Return one row per column of the table of measures: column, unit, description, source.
 
     Parameters
     ----------
-    sessions
-        Sessions whose questionnaires may be columns of the trial table.
+    contexts
+        Metadata of the sessions, whose questionnaires may be columns of the trial table.
     """
     import pandas as pd
 
-    asked = _asked(sessions)
+    return pd.DataFrame(_of_trials(measures, contexts), columns=list(COLUMNS))
 
-    units = session.context.get("trial_units", {})
-    own = {each.name: each.definition for each in OWN}  # of a file that does not define them
-    definitions = own | session.context.get("trial_definitions", {})
+
+def _of_trials(measures: "pd.DataFrame", contexts: Sequence[Mapping[str, Any]]) -> list[Row]:
+    units = dict.fromkeys(TIMES, "s")  # some are computed where none was recorded
+    written = {each.name: each.definition for each in OWN}  # of a file that does not define them
+    for context in contexts:
+        units |= context.get("trial_units", {})
+        written |= context.get("trial_definitions", {})
+    for name, items, scores in _asked(contexts):
+        columns = {f"{name}.{item}": meaning for item, meaning in items.items()}
+        columns |= {
+            score_column(name, score, columns): f"score {score} of {name}, {meaning}"
+            for score, meaning in scores.items()
+        }
+        written |= columns
+    written |= IDENTITY
     computed = {**MEASURES, **PRESENTED, **gaze_units(measures.columns)}
-    rows = []
-    for column in map(str, measures.columns):
-        if column in IDENTITY:
-            row = ("", IDENTITY[column], WRITTEN)
-        elif column in computed:
-            row = (*computed[column], MEASURED)
-        elif column in asked:
-            row = ("", asked[column], WRITTEN)
-        else:
-            defined = str(definitions.get(column) or column.replace("_", " "))
-            row = (str(units.get(column, "")), defined, WRITTEN)
-        rows.append(("trials", column, *row))
-    return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
+    about = {
+        name: computed.get(name)
+        or (str(units.get(name, "")), str(written.get(name) or name.replace("_", " ")))
+        for name in map(str, measures.columns)
+    }
+    return [
+        ("trials", name, *each, MEASURED if name in computed else WRITTEN)
+        for name, each in about.items()
+    ]
 
 
-def event_codebook() -> "pd.DataFrame":
-    """Return the same for the table of events."""
-    import pandas as pd
-
-    rows = [("events", name, *about, WRITTEN) for name, about in EVENTS.items()]
-    return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
+def _described(table: str, about: Mapping[str, tuple[str, str]], source: str) -> Iterator[Row]:
+    return ((table, column, *each, source) for column, each in about.items())
 
 
-def fixation_codebook() -> "pd.DataFrame":
-    """Return the same for the table of fixation points of the eye tracker's checks."""
-    import pandas as pd
-
-    who = {name: ("", IDENTITY[name]) for name in ("participant", "session")}
-    rows = [("fixations", name, *about, MEASURED) for name, about in (who | {**FIXATIONS}).items()]
-    return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
-
-
-def _asked(sessions: Sequence[SessionRecord]) -> dict[str, str]:
-    """Return the meaning of each column of an answer or a score in the trial table."""
-    meanings: dict[str, str] = {}
-    for session in sessions:
-        for name, about in asked_in(session).items():
-            items = {f"{name}.{item['name']}": _meaning(item) for item in about["items"]}
+def _asked(
+    contexts: Sequence[Mapping[str, Any]],
+) -> Iterator[tuple[str, dict[str, str], dict[str, str]]]:
+    """Yield each questionnaire by name, with the meanings of its items and of its scores."""
+    for context in contexts:
+        for name, about in context.get("questionnaires", {}).items():
+            items = {
+                item["name"]: f"{item['text']} ({Item(**item).takes})" for item in about["items"]
+            }
             scores = {
-                score_column(name, score["name"], items): f"score {score['name']} of {name}, "
-                f"{score['lowest']:g} to {score['highest']:g}"
+                score["name"]: f"{score['lowest']:g} to {score['highest']:g}"
                 for score in about["scores"]
             }
-            meanings |= items | scores
-    return meanings
+            yield name, items, scores
 
 
-def _meaning(item: Mapping[str, Any]) -> str:
-    """Return an item's wording and its possible answers, with what they mean."""
-    return f"{item['text']} ({Item(**item).takes})"
-
-
-def questionnaire_codebook(sessions: Sequence[SessionRecord]) -> "pd.DataFrame":
-    """Return the same for the tables of answers and scores, and for every item and score."""
-    import pandas as pd
-
-    rows = [
-        (table, column, *(MEANING.get(column) or ("", IDENTITY[column])), WRITTEN)
-        for table, columns in (("questionnaires", ANSWERS), ("scores", SCORES))
-        for column in columns
-    ]
-    for session in sessions:
-        for name, about in asked_in(session).items():
-            rows += [
-                ("questionnaires.item", f"{name}.{item['name']}", "", _meaning(item), WRITTEN)
-                for item in about["items"]
-            ]
-            rows += [
-                (
-                    "scores.score",
-                    f"{name}.{score['name']}",
-                    "",
-                    f"{score['lowest']:g} to {score['highest']:g}",
-                    WRITTEN,
-                )
-                for score in about["scores"]
-            ]
-    return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
-
-
-def stream_codebook(session: SessionRecord) -> "pd.DataFrame":
-    """Return the same for a session's streams; the table is the stream."""
-    import pandas as pd
-
-    rows, told = [], {f"loop.{each.name}": each.definition for each in LOOP}
+def _of_streams(session: SessionRecord) -> Iterator[Row]:
+    """Yield the columns of a session's streams; the table is the stream."""
+    told = {f"loop.{each.name}": each.definition for each in LOOP}
     for name, stream in session.streams.items():
         source = "another program's stream" if "corrected" in stream.attrs else WRITTEN
-        rows.append((name, "time", "s", "time on the session's clock", source))
+        yield name, "time", "s", "time on the session's clock", source
         if "corrected" in stream.attrs:
-            rows.append((name, "time_raw", "s", "time on the stream's own clock", source))
-        rows += [
-            (name, column, unit, told.get(f"{name}.{column}") or column.replace(".", " "), source)
-            for column, unit in stream.units.items()
-        ]
-    return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
+            yield name, "time_raw", "s", "time on the stream's own clock", source
+        for column, unit in stream.units.items():
+            defined = told.get(f"{name}.{column}") or column.replace(".", " ")
+            yield name, column, unit, defined, source

@@ -254,7 +254,7 @@ def test_a_report_and_the_study_page_tell_time_stamps_from_what_was_shown(
 def test_every_column_of_what_was_shown_is_in_the_codebook(
     stopped: tuple[SessionRecord, pd.Series],
 ) -> None:
-    book = trial_codebook(measure_session(stopped[0]), stopped[0]).set_index("column")
+    book = trial_codebook(measure_session(stopped[0]), [stopped[0].context]).set_index("column")
     for name, (unit, meaning) in PRESENTED.items():
         assert tuple(book.loc[name, ["unit", "description"]]) == (unit, meaning)
 

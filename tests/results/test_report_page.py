@@ -44,6 +44,12 @@ def movements() -> pd.DataFrame:
     return table.assign(outcome="success", practice=0.0, session=1.0, attempt=1.0)
 
 
+@pytest.fixture(scope="module")
+def placed(movements: pd.DataFrame) -> pd.DataFrame:
+    """The same, with the factors that figures are drawn by."""
+    return with_factors(movements)
+
+
 def learned(movements: pd.DataFrame) -> figures.Drawing:
     curves = learning_curves(movements, "movement_time")
     return figures.learning(movements, curves, "movement_time")
@@ -60,8 +66,8 @@ DRAWN: dict[str, Callable[[pd.DataFrame], figures.Drawing]] = {
 
 
 @pytest.fixture(scope="module")
-def drawings(movements: pd.DataFrame) -> dict[str, figures.Drawing]:
-    return {name: draw(movements) for name, draw in DRAWN.items()}
+def drawings(placed: pd.DataFrame) -> dict[str, figures.Drawing]:
+    return {name: draw(placed) for name, draw in DRAWN.items()}
 
 
 def texts(figure: Figure) -> Iterator[tuple[str, tuple[float, float, float, float]]]:

@@ -110,7 +110,7 @@ def by_sequence(
     whose = tested if few and tested is not None else movements
     each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
     series = [Series(_numbers(each.index), _numbers(each[name]), FAINT, "line") for name in each]
-    groups = movements["group"].nunique() > 1 if "group" in movements else False
+    groups = movements["group"].nunique() > 1
     by = ["group", "sequence"] if groups else ["sequence"]
     table = over(whose, measure, by)
     for number, (name, part) in enumerate(table.groupby("group") if groups else [("", table)]):
@@ -128,8 +128,6 @@ def by_sequence(
 
 def _by_phase(movements: "pd.DataFrame", table: "pd.DataFrame") -> "list[pd.DataFrame]":
     """Return a table cut where a session or block ends: no line leads from one into the next."""
-    if "phase" not in movements:
-        return [table]
     phases = movements.groupby("sequence")["phase"].first()
     return [part for _, part in table.groupby(table["sequence"].map(phases))]
 
@@ -227,21 +225,18 @@ def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) ->
     series = []
     fitted_to = curves[curves["measure"] == measure]
     people = {name: number for number, name in enumerate(fitted_to["participant"].unique())}
-    phases = ["participant", *(["phase"] if "phase" in curves else [])]
+    best = fitted_to.sort_values("better").drop_duplicates(["participant", "phase"], keep="last")
     drawn = 0
-    for row in (
-        fitted_to.sort_values("better").drop_duplicates(phases, keep="last").itertuples(index=False)
-    ):
+    for row in best.itertuples(index=False):
         own = movements[movements["participant"] == row.participant]
-        if "phase" in curves:
-            own = own[own["phase"] == row.phase]
+        own = own[own["phase"] == row.phase]
         means = own.groupby("sequence")[measure].mean()
         colour = COLOURS[people[row.participant] % len(COLOURS)]
         series.append(Series(_numbers(means.index), _numbers(means), colour, "dots"))
         if row.better == "no":
             continue
         drawn += 1
-        before = float((own["sequence"] - own["place"]).iloc[0]) if "place" in own else 0.0
+        before = float((own["sequence"] - own["place"]).iloc[0])
         n = np.linspace(1, float(means.index.max()) - before, 100)
         curve: Callable[..., np.ndarray] = CURVES[str(row.curve)]
         fitted = curve(n, row.asymptote, row.gain, row.rate)

@@ -101,7 +101,6 @@ class Page:
             caption=drawing.caption,
             picture=f"{self._up}figures/{drawing.name}",
             csv=self._csv(drawing.name, drawing.table),
-            forms=("svg", "png", "pdf"),
             size=_size(figure),
             whole=len(drawing.panels) > 1,
         )

@@ -6,12 +6,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from labcrane.analysis.codebook import trial_codebook
 from labcrane.analysis.cohort import INCLUDABLE, Cohort, Participant, kinds_of
-from labcrane.analysis.gaze import fixations_of, gaze_units, with_unseen_areas
+from labcrane.analysis.gaze import fixations_of, with_unseen_areas
 from labcrane.analysis.gaze_streams import unmeasured_of
 from labcrane.analysis.measures import DEFAULTS, MeasureSettings, measures_of
 from labcrane.analysis.parallel import work
-from labcrane.analysis.presented import PRESENTED
 from labcrane.analysis.quality import (
     exclusions,
     is_result,
@@ -53,7 +53,6 @@ from labcrane.analysis.statistics.mixed import TIMES, MixedModel, NoModelError, 
 from labcrane.analysis.statistics.time_outs import time_outs
 from labcrane.analysis.statistics.time_scales import QUANTITIES, TAKEN
 from labcrane.analysis.tables.annotations import annotations_of
-from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.analysis.unusable import Unusable
 from labcrane.files.yaml import parse_yaml
 from labcrane.recording.participant_file.writer import kept_open
@@ -583,21 +582,9 @@ def _setting(value: object) -> str:
 
 def _definitions(cohort: Cohort, everything: "pd.DataFrame") -> "pd.DataFrame":
     """Return unit and meaning of the measures, and of the recorded columns of trials."""
-    import pandas as pd
-
-    units = dict.fromkeys(TIMES, "s")  # some are computed where none was recorded
-    recorded: dict[str, str] = {}
-    for person in cohort.included:
-        units |= person.context.get("trial_units", {})
-        recorded |= person.context.get("trial_definitions", {})
-    computed = {**MEASURES, **PRESENTED, **gaze_units(everything.columns)}
-    rows = [(name, unit, meaning) for name, (unit, meaning) in computed.items()]
-    rows += [
-        (name, units.get(name, ""), recorded.get(name, ""))
-        for name in map(str, everything)
-        if name in {**units, **recorded} and name not in computed
-    ]
-    return pd.DataFrame(rows, columns=["measure", "unit", "meaning"])
+    book = trial_codebook(everything, [person.context for person in cohort.included])
+    table = book.rename(columns={"column": "measure", "description": "meaning"})
+    return table[["measure", "unit", "meaning"]]
 
 
 def _participant_page(participant: Participant, tables: PersonTables, folder: Path) -> None:
