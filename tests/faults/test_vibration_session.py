@@ -130,9 +130,8 @@ def test_commands_are_answered_and_the_answers_recorded(done: Done) -> None:
 
 @needs("g++")
 @pytest.mark.slow
-def test_the_session_is_replayed_exported_and_reported(done: Done, tmp_path: Path) -> None:
+def test_the_session_is_exported_and_reported(done: Done, tmp_path: Path) -> None:
     for words in (
-        ("replay", done.data / "P001-SIMULATED" / "P001-SIMULATED.h5"),
         ("export", done.data, "--include", "simulated", "--to", "tables", "--out", tmp_path / "t"),
         ("report", done.data, "--include", "simulated", "--out", tmp_path / "r"),
     ):
