@@ -31,8 +31,8 @@ opened, and needs two seconds for it."""
 
 WRITE_S = 0.1
 LISTEN_S = 0.05
-LONGEST = 64
-"""Bytes of the longest answer."""
+LONGEST, DATAGRAM = 64, 4096
+"""Bytes of the longest answer, and of a datagram with several of them."""
 
 PULSE_MS = 200
 """How long a controller rumbles when it is not told again."""
@@ -235,7 +235,7 @@ class UdpTactors(Line):
 
     def read(self) -> bytes:
         try:
-            return self._socket.recv(LONGEST)
+            return self._socket.recv(DATAGRAM)
         except TimeoutError:
             return b""
         except ConnectionRefusedError:
