@@ -6,7 +6,8 @@ Writes ``benchmarks/RESULTS.md`` with the machine and the date; rows of omitted 
 unchanged. Absolute figures from a shared computer are noisy. Every row therefore has a bare
 reference from the same run, the ratio to it, and the largest ratio that is allowed. With
 ``--check``, the exit status is 1 when a ratio exceeds its limit, and each such row is listed. A
-benchmark that cannot run counts as failed, with the reason, and the others continue. ``--brief``
+benchmark that cannot run counts as failed, with the reason, and the others continue; one whose
+programs are not installed is not tried, and named. ``--brief``
 runs each for an instant, to check that it can run; its figures are meaningless and not written.
 All benchmarks together take about 22 minutes; the computer should be idle.
 """
@@ -14,6 +15,7 @@ All benchmarks together take about 22 minutes; the computer should be idle.
 import argparse
 import os
 import platform
+import shutil
 import sys
 import time
 import traceback
@@ -29,6 +31,11 @@ SUBJECTS = (
     "tick", "scenario", "oversight", "beside", "real_time", "recording", "length", "sync",
     "signals", "view", "viewer", "sound", "analysis", "report", "cohort", "start_up", "pages",
 )  # fmt: skip
+NEEDS = {
+    "beside": ("jackd", "jack_wait"), "real_time": ("jackd", "jack_wait"), "sync": ("gcc",),
+}  # fmt: skip
+"""Programs without which a benchmark is not tried."""
+
 RESULTS = Path(__file__).with_name("RESULTS.md")
 HEAD = "| benchmark | figure | labcrane | reference | | ratio | at most | measured |"
 
@@ -46,10 +53,13 @@ def main(words: Sequence[str] | None = None) -> int:
     chosen = asked.only.split(",") if asked.only else list(SUBJECTS)
     if unknown := set(chosen) - set(SUBJECTS):
         parser.error(f"there is no {', '.join(sorted(unknown))}; there is {', '.join(SUBJECTS)}")
-    lines, measured, failed = kept(), [], []
+    lines, measured, failed, not_tried = kept(), [], [], []
     for subject in chosen:
         print(f"== {subject}", flush=True)
         began = time.monotonic()
+        if missing := [name for name in NEEDS.get(subject, ()) if shutil.which(name) is None]:
+            not_tried.append(f"{subject} was not tried: there is no {' and no '.join(missing)}")
+            continue
         try:
             rows = import_module(f"benchmarks.{subject}").rows(brief=asked.brief)
         except (Exception, SystemExit) as error:  # noqa: BLE001 - the others go on
@@ -64,6 +74,7 @@ def main(words: Sequence[str] | None = None) -> int:
         print(f"{subject} took {time.monotonic() - began:.0f} s", flush=True)
         if not asked.brief:
             write(lines)
+    print("".join(f"{each}\n" for each in not_tried), end="")
     if asked.brief:
         print("\n".join(f"MISSED {each}" for each in failed) or "all could be run")
         return 1 if failed else 0

@@ -47,6 +47,18 @@ def test_a_ratio_above_its_limit_is_named_and_fails_the_check(
     assert benchmarks.main(["--only", "slow"]) == 0, "it only tells unless it is asked to check"
 
 
+def test_a_benchmark_whose_programs_are_not_installed_is_not_tried_by_name(
+    benchmarks: types.ModuleType,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(benchmarks, "NEEDS", {"slow": ("no-such-server",)})
+    assert benchmarks.main(["--check"]) == 0
+    said = capsys.readouterr().out
+    assert "slow was not tried: there is no no-such-server\n" in said
+    assert "all 1 are kept" in said
+
+
 def test_what_was_missed_before_and_is_not_measured_now_is_named(
     benchmarks: types.ModuleType, capsys: pytest.CaptureFixture[str]
 ) -> None:
