@@ -174,6 +174,7 @@ class FeedbackContract:
             assert after == before, f"present() gave shape {before}, then {after}"
 
     def test_feedback_closes_without_having_been_opened(self, feedback: Feedback) -> None:
+        feedback.update(SessionState(trial=1))  # before a preview, which needs nothing open
         feedback.close()
 
     def test_feedback_closes_after_a_failed_open(self, feedback: Feedback) -> None:

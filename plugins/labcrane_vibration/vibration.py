@@ -47,6 +47,8 @@ class Vibration(Feedback):
         self._settings = settings
         self._open_device = open_device
         self._device: Device | None = None
+        self._given: float | None = None
+        self._trial = 0
         self._forget()
 
     def _forget(self) -> None:
@@ -60,7 +62,7 @@ class Vibration(Feedback):
         self._target = run.task.find("target.position")
         self._radius = run.task.index("target.radius")
         self._rate = run.rate_hz
-        self._given: float | None = None
+        self._given = None
         self._trial = 0
         self._forget()
         self._device = self._open_device(self._settings)

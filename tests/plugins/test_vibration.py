@@ -18,7 +18,7 @@ from virtual_sticks import desk
 
 from labcrane import DeviceError, Feedback, Frame, Run
 from labcrane.cli.app import main
-from labcrane.core import Within
+from labcrane.core import SessionState, Within
 from labcrane.core.clock import Tick
 from labcrane.testing import TARGETS, FeedbackContract, ch8, make_run, make_target
 from labcrane_sonification.settings import SonificationSettings
@@ -184,7 +184,9 @@ def test_other_laws_are_taken_up_while_it_is_open(run: Run) -> None:
 
 def test_a_preview_is_a_picture(run: Run, tmp_path: Path) -> None:
     frames = [at(run, (3.0 - due, 0, 0), due) for due in np.arange(0.0, 2.0, 0.05)]
-    (file,) = vibrating(run).preview(run, frames, tmp_path / "pulse")
+    closed = Vibration(settings())
+    closed.update(SessionState(trial=1, active=("pulse",)))
+    (file,) = closed.preview(run, frames, tmp_path / "pulse")
     assert file.name == "pulse.png"
     assert file.read_bytes().startswith(b"\x89PNG")
 
