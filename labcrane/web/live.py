@@ -1,6 +1,5 @@
 """Signals of machine, scenario and loop, from the session's LSL stream of whole frames."""
 
-import math
 import threading
 import time
 from collections import deque
@@ -14,8 +13,6 @@ from labcrane.streams.newest import NewestSample
 if TYPE_CHECKING:
     import pylsl
 
-HISTORY_S = 20.0
-CHART_HZ = 20.0
 PAUSE_S = 0.02
 RECENT_S = 1.0
 """The lateness that is shown is the worst of this time."""
@@ -26,7 +23,7 @@ BANDS = 120
 
 
 class Live:
-    """Keeps the newest value of every signal, and some seconds of history for charts.
+    """Keeps the newest value of every signal, and how late the loop was.
 
     A thread pulls; readers get the latest data. The stream is found again when a session is.
 
@@ -40,8 +37,6 @@ class Live:
         Columns whose value has changed since the first frame.
     trouble
         Why the newest frames could not be taken up; empty when they were.
-    age_s
-        How old the newest frame was when it came, in seconds.
     """
 
     def __init__(self, source: str) -> None:
@@ -49,16 +44,12 @@ class Live:
         self.units: dict[str, str] = {}
         self.moved: set[str] = set()
         self.trouble = ""
-        self.age_s: float | None = None
         self._came: float | None = None
         self._bands: deque[tuple[float, float]] = deque(maxlen=BANDS)
         self._band: list[float] = []
         self._band_ends = 0.0
         self._source = source
         self._late: deque[tuple[float, float]] = deque()  # due and lateness of late ticks, in s
-        self._history: deque[tuple[float, dict[str, float]]] = deque(
-            maxlen=round(HISTORY_S * CHART_HZ)
-        )
         threading.Thread(target=self._pull, name="live", daemon=True).start()
 
     @property
@@ -77,19 +68,7 @@ class Live:
         """Median and worst lateness of each half second of the last minute, in seconds."""
         return list(self._bands)
 
-    def history(self, signal: str) -> list[tuple[float, float]]:
-        """Return times in seconds before now and values of a signal, oldest first."""
-        kept = list(self._history)
-        end = kept[-1][0] if kept else 0.0
-        return [
-            (round(t - end, 3), values[signal])
-            for t, values in kept
-            if math.isfinite(values.get(signal, math.nan))
-        ]
-
     def _pull(self) -> None:
-        import pylsl  # noqa: PLC0415
-
         wanted = {"source_id": f"labcrane/{self._source}/{FRAME}"}
         frames = NewestSample(wanted, self._described, buffer_s=1)
         while True:
@@ -97,7 +76,6 @@ class Live:
             if stamps:
                 self.hear(samples)
                 self._came = time.monotonic()
-                self.age_s = pylsl.local_clock() - stamps[-1]
             time.sleep(PAUSE_S)
 
     def hear(self, samples: Sequence[Sequence[float]]) -> None:
@@ -132,5 +110,3 @@ class Live:
             name for name, value in newest.items() if self.newest.get(name, value) != value
         }
         self.newest = newest
-        if not self._history or newest["due"] - self._history[-1][0] >= 1.0 / CHART_HZ:
-            self._history.append((newest["due"], newest))

@@ -35,7 +35,7 @@ class Reports:
         with self._all:
             for what in dict.fromkeys(what for task in tasks for what in task.reports):
                 ui.button(
-                    words.seen(what),
+                    words.about(words.seen, what),
                     on_click=partial(self._context.give, self._page, Order.REPORT, what),
                 ).props(f'size=lg no-caps color=primary id="report-{what}"')
             self._said = ui.label().classes("text-lg").props('id="reported" role=status')
@@ -43,9 +43,9 @@ class Reports:
         ui.timer(RATE_S, self._update)
 
     def _update(self) -> None:
-        session = self._context.session
+        session, words = self._context.session, self._context.words(self._page)
         self._all.set_visibility(bool(session.trial))
-        self._said.set_text(", ".join(map(self._context.words(self._page).heard, session.reported)))
+        self._said.set_text(", ".join(words.about(words.heard, one) for one in session.reported))
 
 
 def said(load: float, unit: str, joint: Joint) -> str:

@@ -1,7 +1,7 @@
 """Translations of the pages' own wording into the participant's language."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from labcrane.core.items import Item
 from labcrane.protocol.pages import Language
@@ -25,8 +25,10 @@ class Words:
         Messages for a questionnaire with gaps, for text with personal data, and for a value that
         an item does not take (with ``{takes}``).
     seen, heard
-        Return the label of the button that reports something, and the text after the report has
-        arrived; both take its name.
+        Patterns with ``{what}``: the label of the button that reports something, and the text after
+        the report has arrived.
+    names
+        Of the things that the bundled tasks ask about.
     """
 
     wait: str
@@ -51,8 +53,13 @@ class Words:
     lacking: str
     personal: str
     possible: str
-    seen: Callable[[str], str]
-    heard: Callable[[str], str]
+    seen: str
+    heard: str
+    names: Mapping[str, str] = field(default_factory=dict)
+
+    def about(self, pattern: str, what: str) -> str:
+        """Return a pattern filled with a thing's name."""
+        return pattern.format(what=self.names.get(what, what))
 
     def takes(self, item: Item) -> str:
         """Return what an item takes."""
@@ -72,20 +79,6 @@ class Words:
         return (
             self.personal if item.kind == "text" else self.possible.format(takes=self.takes(item))
         )
-
-
-NAMES: Mapping[Language, Mapping[str, str]] = {
-    "de": {"deformity": "Verformung"},
-    "pl": {"deformity": "zniekształcenie"},
-    "fr": {"deformity": "déformation"},
-    "es": {"deformity": "deformidad"},
-}
-"""Names of the things that the bundled tasks ask about."""
-
-
-def _named(language: Language, pattern: str) -> Callable[[str], str]:
-    """Return a function that fills a pattern with a thing's name in a language."""
-    return lambda what: pattern.format(what=NAMES.get(language, {}).get(what, what))
 
 
 ENGLISH = Words(
@@ -111,8 +104,8 @@ ENGLISH = Words(
     lacking="Some answers are missing: please answer, or choose “No answer”",
     personal="Please write without an e-mail address or a telephone number",
     possible="Possible is {takes}",
-    seen=_named("en", "I see: {what}"),
-    heard=_named("en", "{what}: reported"),
+    seen="I see: {what}",
+    heard="{what}: reported",
 )
 
 GERMAN = Words(
@@ -138,8 +131,9 @@ GERMAN = Words(
     lacking="Es fehlen noch Antworten: bitte antworten oder „Keine Angabe“ wählen",
     personal="Bitte ohne E-Mail-Adresse und Telefonnummer schreiben",
     possible="Möglich ist {takes}",
-    seen=_named("de", "Ich sehe: {what}"),
-    heard=_named("de", "{what}: gemeldet"),
+    seen="Ich sehe: {what}",
+    heard="{what}: gemeldet",
+    names={"deformity": "Verformung"},
 )
 
 POLISH = Words(
@@ -165,8 +159,9 @@ POLISH = Words(
     lacking="Brakuje jeszcze odpowiedzi: proszę odpowiedzieć albo wybrać „Bez odpowiedzi”",
     personal="Proszę pisać bez adresu e-mail i numeru telefonu",
     possible="Możliwa odpowiedź: {takes}",
-    seen=_named("pl", "Widzę: {what}"),
-    heard=_named("pl", "{what}: zgłoszono"),
+    seen="Widzę: {what}",
+    heard="{what}: zgłoszono",
+    names={"deformity": "zniekształcenie"},
 )
 
 FRENCH = Words(
@@ -192,8 +187,9 @@ FRENCH = Words(
     lacking="Il manque encore des réponses : répondez ou choisissez « Sans réponse »",
     personal="Écrivez sans adresse e-mail ni numéro de téléphone",
     possible="Réponse possible : {takes}",
-    seen=_named("fr", "Je vois : {what}"),
-    heard=_named("fr", "{what} : signalé"),
+    seen="Je vois : {what}",
+    heard="{what} : signalé",
+    names={"deformity": "déformation"},
 )
 
 SPANISH = Words(
@@ -219,8 +215,9 @@ SPANISH = Words(
     lacking="Aún faltan respuestas: responda o elija «Sin respuesta»",
     personal="Escriba sin correo electrónico ni número de teléfono",
     possible="Respuesta posible: {takes}",
-    seen=_named("es", "Veo: {what}"),
-    heard=_named("es", "{what}: comunicado"),
+    seen="Veo: {what}",
+    heard="{what}: comunicado",
+    names={"deformity": "deformidad"},
 )
 
 WORDS: Mapping[Language, Words] = {

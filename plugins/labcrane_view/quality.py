@@ -42,15 +42,22 @@ LEVELS: Mapping[Level, RenderQuality] = {
 }
 
 
-def picture_s(draw: Callable[[], None], now: Callable[[], float] = time.perf_counter) -> float:
-    """Return how long a picture takes, in seconds: the median of some."""
-    for _ in range(WARM):
+def intervals_s(
+    draw: Callable[[], None], warm: int, count: int, now: Callable[[], float]
+) -> list[float]:
+    """Draw pictures; return how long each of the last ``count`` took, in seconds."""
+    for _ in range(warm):
         draw()
     moments = [now()]
-    for _ in range(MEASURED):
+    for _ in range(count):
         draw()
         moments.append(now())
-    return median(after - before for before, after in pairwise(moments))
+    return [after - before for before, after in pairwise(moments)]
+
+
+def picture_s(draw: Callable[[], None], now: Callable[[], float] = time.perf_counter) -> float:
+    """Return how long a picture takes, in seconds: the median of some."""
+    return median(intervals_s(draw, WARM, MEASURED, now))
 
 
 def chosen(measure: Callable[[Level], float]) -> tuple[Level, str]:

@@ -5,10 +5,10 @@ import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 from labcrane import DeviceError
 from labcrane.core import Value
+from labcrane_view.quality import intervals_s
 from labcrane_view.screen.monitors import monitors, refresh_rates
 from labcrane_view.screen.window import BACK_BUFFERS, Window
 from labcrane_view.settings import ViewSettings
@@ -88,13 +88,7 @@ def measured(
     """Draw some pictures, and return how they get onto the glass."""
     if math.isnan(rate_hz):
         return Refresh(buffers=buffers)
-    for _ in range(WARM):
-        draw()
-    moments = [now()]
-    for _ in range(MEASURED):
-        draw()
-        moments.append(now())
-    intervals = [after - before for before, after in pairwise(moments)]
+    intervals = intervals_s(draw, WARM, MEASURED, now)
     return Refresh(rate_hz, waited(intervals, rate_hz), buffers)
 
 
