@@ -13,9 +13,12 @@ needs_emmeans = needs("Rscript", "afex", "emmeans")
 needs_octave = needs("octave-cli")
 
 
+SAY = 'say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000);'
+
+
 def r(script: str, *arguments: object) -> str:
-    """Run a script in R; return what it prints."""
-    return _run(["Rscript", "--vanilla", "-e", script, *map(str, arguments)])
+    """Run a script in R, which may ``say(key, numbers)``; return what it prints."""
+    return _run(["Rscript", "--vanilla", "-e", SAY + script, *map(str, arguments)])
 
 
 def octave(script: str, argument: object) -> str:

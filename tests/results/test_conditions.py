@@ -121,7 +121,6 @@ def test_means_beside_the_test_of_conditions_are_without_the_period() -> None:
 OF_PERIODS = """
 suppressMessages(library(afex))
 d <- read.csv(commandArgs(TRUE)[1])
-say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
 for (cohort in unique(d$cohort)) {
   own <- d[d$cohort == cohort, ]
   own$period <- factor(own$period)

@@ -12,8 +12,7 @@ from labcrane.analysis.quality import is_result
 from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.report.report import write_report
 from labcrane.cli.app import main
-from results.consumers import needs_emmeans, needs_r, r, table
-from results.tested import anova_table
+from results.consumers import needs_r, r, table
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(900)]
 
@@ -110,64 +109,8 @@ def test_practice_is_a_factor_and_counts_for_no_average(
     assert ("absolute_error", "group:practice") in tested.index
 
 
-AFEX = """
-suppressMessages(library(afex))
-d <- read.csv(commandArgs(TRUE)[1])
-say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
-designs <- list("phase", c("phase", "place"), c("phase", "distance"), c("phase", "far_side"))
-for (dv in c("movement_time", "absolute_error", "circle_to_circle")) for (within in designs) {
-  fit <- suppressMessages(suppressWarnings(aov_ez(
-    "participant", dv, d, within = within, between = "group", fun_aggregate = mean)))
-  plain <- anova(fit, es = "pes", correction = "none")
-  gg <- anova(fit, es = "pes", correction = "GG")
-  last <- within[length(within)]
-  for (effect in rownames(plain)) if (length(within) == 1 || grepl(last, effect))
-    say(paste(dv, effect), plain[effect, "F"], plain[effect, "num Df"], plain[effect, "den Df"],
-        gg[effect, "num Df"], gg[effect, "den Df"], gg[effect, "Pr(>F)"], gg[effect, "pes"])
-}
-"""
-
-
-@needs_r
-def test_every_mixed_test_of_the_report_is_that_of_afex(
-    report: Path, movements: pd.DataFrame
-) -> None:
-    compare_with_afex(told(report, "anova"), report / "for_r.csv")
-
-
-@needs_r
-def test_who_lacks_a_cell_is_left_out_as_afex_does(report: Path, movements: pd.DataFrame) -> None:
-    """Of three in a group and four in the other, one has no movement at one position."""
-    who = movements.loc[movements["group"] == "none", "participant"].iloc[0]
-    here = (movements["participant"] == who) & (movements["place"] == 2)
-    lacking = movements[~(here & (movements["phase"] == "2 retention"))]
-    lacking.to_csv(report / "lacking.csv", index=False)
-    table_of_ours = anova_table(lacking, factors_of(lacking))
-    places = table_of_ours[table_of_ours["factor"] == "sequence"]
-    assert all(who in names for names in places["left_out"])
-    compare_with_afex(table_of_ours, report / "lacking.csv")
-
-
-def compare_with_afex(table_of_ours: pd.DataFrame, path: Path) -> None:
-    theirs = table(r(AFEX, path))
-    ours = table_of_ours.set_index(["measure", "factor"])
-    words = {"phase": "session", "place": "sequence"}
-    seen = 0
-    for key, values in theirs.items():
-        measure, _, effect = key.partition(" ")
-        name = ":".join(words.get(part, part) for part in effect.split(":"))
-        row = ours.loc[(measure, name)]
-        corrected = [row["epsilon"] * row["df1"], row["epsilon"] * row["df2"]]
-        found = [row["f"], row["df1"], row["df2"], *corrected, row["p_gg"], row["eta2p"]]
-        np.testing.assert_allclose(found, np.array(values, float), rtol=1e-6, err_msg=key)
-        assert row["n"] + len(str(row["left_out"]).replace("nan", "").split()) == PEOPLE
-        seen += 1
-    assert seen == 3 * (3 + 3 * 4)
-
-
 CONTRASTS = """
 d <- read.csv(commandArgs(TRUE)[1])
-say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
 m <- aggregate(movement_time ~ participant + group + phase, d, mean)
 w <- reshape(m, idvar = c("participant", "group"), timevar = "phase", direction = "wide")
 w$group <- factor(w$group); contrasts(w$group) <- contr.sum(2)
@@ -197,41 +140,6 @@ def test_contrasts_are_those_of_linear_models_of_each_difference(
         row = found[key]
         ours = [row.difference, row.se, row.t, row.p]
         np.testing.assert_allclose(ours, np.array(values, float), rtol=1e-6, err_msg=key)
-
-
-EMMEANS = """
-suppressMessages({library(afex); library(emmeans)})
-d <- read.csv(commandArgs(TRUE)[1])
-d$distance <- factor(d$distance)
-say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
-for (dv in c("movement_time", "absolute_error")) {
-  fit <- suppressMessages(suppressWarnings(aov_ez("participant", dv, d,
-    within = c("phase", "distance"), between = "group", fun_aggregate = mean)))
-  for (factor in c("distance", "phase", "group")) {
-    if (factor != "distance") fit <- suppressMessages(suppressWarnings(aov_ez("participant", dv, d,
-      within = "phase", between = "group", fun_aggregate = mean)))
-    means <- suppressMessages(emmeans(fit, factor, model = "multivariate"))
-    s <- summary(contrast(means, "pairwise", adjust = "holm"))
-    say(paste(dv, factor), s$estimate, s$SE, s$df, s$t.ratio, s$p.value)
-  }
-}
-"""
-
-
-@needs_emmeans
-def test_contrasts_of_unequal_groups_and_two_sessions_are_those_of_emmeans(
-    report: Path, movements: pd.DataFrame
-) -> None:
-    theirs = table(r(EMMEANS, report / "for_r.csv"))
-    own = told(report, "contrasts").fillna({"at": ""})
-    own = own[own["at"] == ""]
-    words = {"phase": "session"}
-    assert len(theirs) == 6
-    for key, values in theirs.items():
-        measure, factor = key.split(" ")
-        here = own[(own["measure"] == measure) & (own["factor"] == words.get(factor, factor))]
-        found = here[["difference", "se", "df", "t", "p_holm"]].to_numpy(float).T.ravel()
-        np.testing.assert_allclose(found, np.array(values, float), rtol=1e-6, err_msg=key)
 
 
 def test_time_outs_are_counted_beside_the_mean_of_what_succeeded(report: Path) -> None:

@@ -79,7 +79,6 @@ def test_means_and_n_beside_a_test_are_of_those_who_were_tested(
 AFEX = """
 suppressMessages(library(afex))
 d <- read.csv(commandArgs(TRUE)[1])
-say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
 for (last in c("", "distance", "far_side")) {
   fit <- suppressMessages(suppressWarnings(aov_ez("participant", "movement_time", d,
     within = c("phase", if (nzchar(last)) last), between = "group", fun_aggregate = mean)))

@@ -102,7 +102,6 @@ IN_R = {
 LME4 = """
 suppressMessages(library(lme4))
 d <- read.csv(commandArgs(TRUE)[1], colClasses = c(phase = "character"))
-say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
 for (cohort in unique(d$cohort)) {
   own <- d[d$cohort == cohort, ]
   own$s <- own$sequence - mean(own$sequence); own$b <- own$difficulty - mean(own$difficulty)

@@ -91,21 +91,9 @@ def test_sessions_with_the_same_blocks_are_two_factors_as_afex_has_them(
     done, factors = told(seed, BLOCKS)
     done.to_csv(tmp_path / "movements.csv", index=False)
     theirs = table(r(AFEX, tmp_path / "movements.csv"))
-    tests = tested.anova_table(done, factors).set_index("factor")
-    contrasts = tested.contrast_table(done, factors).fillna({"at": ""})
     assert len(theirs) == 7 + 3 * 8 + 2
-    for key, values in theirs.items():
-        kind, effect = key.split(" ")
-        parts = effect.split(":")
-        name = ":".join(WORDS.get(part, part) for part in parts)
-        if kind == "anova":
-            row = tests.loc[name]
-            corrected = [row["epsilon"] * row["df1"], row["epsilon"] * row["df2"]]
-            ours = [row["f"], row["df1"], row["df2"], *corrected, row["p_gg"], row["eta2p"]]
-        else:
-            own = contrasts[(contrasts["factor"] == name) & (contrasts["at"] == "")]
-            ours = own[["difference", "se", "df", "t", "p"]].to_numpy(float).ravel()
-        np.testing.assert_allclose(ours, np.array(values, float), rtol=1e-6, err_msg=key)
+    tested.compare_with_afex(theirs, done, factors, WORDS, "p")
+    tests = tested.anova_table(done, factors).set_index("factor")
     people = done["participant"].nunique()
     assert set(tests.loc[["session", "block", "session:block"], "n"]) == {people - 1}
 

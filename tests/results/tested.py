@@ -1,7 +1,8 @@
 """The report's tables of tests, from movements alone."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
+import numpy as np
 import pandas as pd
 
 from labcrane.analysis.report.factors import Factors
@@ -48,6 +49,39 @@ def contrast_table(
     results: pd.DataFrame, factors: Factors, primary: Sequence[str] = ()
 ) -> pd.DataFrame:
     return _table("contrasts", of_contrasts(all_results(results, factors, primary)), factors)
+
+
+def compare_with_afex(
+    theirs: Mapping[str, Sequence[str]],
+    results: pd.DataFrame,
+    factors: Factors,
+    names: Mapping[str, str],
+    p: str = "p_holm",
+) -> None:
+    """Compare tests and contrasts of movement time with what R said of each effect.
+
+    Parameters
+    ----------
+    theirs
+        By ``anova EFFECT``: F, degrees of freedom without and with a correction, p, eta squared; by
+        ``contrast FACTOR``: differences, errors, degrees of freedom, t and ``p``.
+    names
+        The report's names of columns.
+    """
+    tests = anova_table(results, factors).set_index(["measure", "factor"])
+    contrasts = contrast_table(results, factors).set_index("measure")
+    contrasts = contrasts[contrasts["at"].fillna("") == ""].loc["movement_time"]
+    for key, values in theirs.items():
+        kind, effect = key.split(" ")
+        name = ":".join(names.get(part, part) for part in effect.split(":"))
+        if kind == "anova":
+            row = tests.loc[("movement_time", name)]
+            corrected = [row["epsilon"] * row["df1"], row["epsilon"] * row["df2"]]
+            ours = [row["f"], row["df1"], row["df2"], *corrected, row["p_gg"], row["eta2p"]]
+        else:
+            own = contrasts[contrasts["factor"] == name]
+            ours = own[["difference", "se", "df", "t", p]].to_numpy(float).T.ravel().tolist()
+        np.testing.assert_allclose(ours, np.array(values, float), rtol=1e-6, err_msg=key)
 
 
 def gaze_tests(results: pd.DataFrame, factors: Factors) -> pd.DataFrame:
