@@ -79,11 +79,15 @@ def suggestion(word: str, known: Iterable[str], otherwise: str = "there is") -> 
 def nearest(word: str, known: Iterable[str], there: str) -> str:
     """Return the known word that is closest, as a question where one is close, and all of them."""
     names = list(known)
-    listed = ", ".join(names) or "none"
     close = meant(word, names)
-    if close and len(names) > MOST_LISTED:
-        listed = f"{', '.join(names[:MOST_LISTED])} and {len(names) - MOST_LISTED} more"
+    listed = shortened(names, MOST_LISTED if close else len(names)) or "none"
     return f"{close} {there} {listed}".lstrip()
+
+
+def shortened(names: Sequence[str], most: int, between: str = ", ") -> str:
+    """Return names in a row: the first of many, and how many more there are."""
+    more = len(names) - most
+    return between.join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def meant(word: str, known: Sequence[str]) -> str:

@@ -127,28 +127,28 @@ def _where(tests: Sequence[OperatorTest], *, across: bool) -> str:
 
 def _felt(tests: Sequence[OperatorTest]) -> dict[str, tuple[float, float]]:
     """Return the means of each rating's first and last few, where it was given often enough."""
-    found = {}
-    for name in SUBJECTIVE:
-        given = [
-            rating for test in tests if not math.isnan(rating := getattr(test.performance, name))
-        ]
-        if len(given) >= FEWEST:
-            found[name] = (float(np.mean(given[:WINDOW])), float(np.mean(given[-WINDOW:])))
-    return found
+    return {
+        name: (float(np.mean(given[:WINDOW])), float(np.mean(given[-WINDOW:])))
+        for name, given in _given(tests).items()
+        if len(given) >= FEWEST
+    }
+
+
+def _given(tests: Sequence[OperatorTest]) -> dict[str, list[float]]:
+    """Return the ratings that were given."""
+    every = {name: [getattr(test.performance, name) for test in tests] for name in SUBJECTIVE}
+    return {
+        name: [rating for rating in own if not math.isnan(rating)] for name, own in every.items()
+    }
 
 
 def _ratings(tests: Sequence[OperatorTest]) -> str:
-    parts = []
-    for name in SUBJECTIVE:
-        given = [
-            rating for test in tests if not math.isnan(rating := getattr(test.performance, name))
-        ]
-        parts.append(
-            f"rated {name} went from {given[0]:.2f} to {given[-1]:.2f}"
-            if given
-            else f"no {name} was rated"
-        )
-    return ", ".join(parts)
+    return ", ".join(
+        f"rated {name} went from {given[0]:.2f} to {given[-1]:.2f}"
+        if given
+        else f"no {name} was rated"
+        for name, given in _given(tests).items()
+    )
 
 
 def _runs(number: int) -> str:

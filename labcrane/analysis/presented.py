@@ -11,6 +11,7 @@ from pydantic import PositiveFloat
 
 from labcrane.core.findings import Finding, Verdict
 from labcrane.core.settings import Settings
+from labcrane.errors import shortened
 from labcrane.recording.labels import Attempt, attempt_of
 from labcrane.recording.pictures import LOG, RATE_S
 
@@ -359,5 +360,4 @@ def _limits(session: "SessionRecord") -> PresentedLimits:
 
 
 def _named(rows: Sequence[Mapping[Hashable, Any]]) -> str:
-    said = [f"trial {row['trial']:g}: {in_words(row)}" for row in rows[:NAMED]]
-    return "; ".join([*said, *([f"and {len(rows) - NAMED} more"] if len(rows) > NAMED else [])])
+    return shortened([f"trial {row['trial']:g}: {in_words(row)}" for row in rows], NAMED, "; ")

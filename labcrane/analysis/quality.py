@@ -8,7 +8,7 @@ import numpy as np
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.presented import in_words, not_presented
 from labcrane.core.findings import Verdict, worst
-from labcrane.errors import RecordingError
+from labcrane.errors import RecordingError, shortened
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -117,9 +117,8 @@ def check_probed(participants: Iterable[Participant], *, accept: bool) -> list[s
     """
     found = unprobed(participants)
     if found and not accept:
-        more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
         raise RecordingError(
-            f"timestamp accuracy of {'; '.join(found[:SHOWN])}{more} is unknown: their "
+            f"timestamp accuracy of {shortened(found, SHOWN, '; ')} is unknown: their "
             "clock offsets were not measured; remove these streams from the study, or use "
             "--accept-unprobed (the output notes it)"
         )

@@ -8,7 +8,8 @@ from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.presented import not_presented
 from labcrane.analysis.quality import is_result, without_onset
 from labcrane.analysis.report.factors import GROUP, PLACE
-from labcrane.analysis.report.findings import Results, StudyFinding, people_in_words
+from labcrane.analysis.report.findings import NAMED, Results, StudyFinding, people_in_words
+from labcrane.analysis.report.sample import counted
 from labcrane.analysis.report.words import (
     NAMES,
     STYLES,
@@ -22,6 +23,7 @@ from labcrane.analysis.report.words import (
 )
 from labcrane.analysis.statistics.anova import Anova, Contrast, marginal_means, word
 from labcrane.analysis.statistics.trends import Trend
+from labcrane.errors import shortened
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,7 +65,7 @@ def _design(cohort: Cohort, everything: "pd.DataFrame", results: Results | None)
     context = cohort.included[0].context
     sessions = int(everything["session"].nunique()) if len(everything) else 0
     said = f"{context.get('title') or context.get('study', 'A study')}: "
-    said += f"{sessions} {'session' if sessions == 1 else 'sessions'} with movements"
+    said += f"{counted(sessions, 'session')} with movements"
     if results is None:
         return f"{said}. No tests were made."
     factors = results.factors
@@ -190,16 +192,12 @@ def _exclusions(everything: "pd.DataFrame") -> str:
     unseen = everything[not_presented(everything)]
     if len(unseen):
         people = unseen["participant"].nunique()
-        who = f"{people} {'participant' if people == 1 else 'participants'}"
+        who = counted(people, "participant")
         said += (
             f" The operator saw or heard too little of {len(unseen)}, from {who}: {listed(unseen)}."
         )
     still = everything[without_onset(everything)]
     return f"{said} Without an onset: {listed(still)}." if len(still) else said
-
-
-NAMED = 12
-"""Movements named one by one in a sentence; a table has the others."""
 
 
 def listed(movements: "pd.DataFrame") -> str:
@@ -209,7 +207,6 @@ def listed(movements: "pd.DataFrame") -> str:
         f"{row['participant']} "
         + (f"session {row['session']:g} " if several else "")
         + f"trial {row['trial']:g}"
-        for row in movements.head(NAMED).to_dict("records")
+        for row in movements.to_dict("records")
     ]
-    more = len(movements) - len(names)
-    return ", ".join(names) + (f" and {more} more" if more else "")
+    return shortened(names, NAMED)

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from labcrane.analysis.report.panels import FAINT, GREY, Panel, Series, figure_of, lighter
+from labcrane.analysis.report.sample import counted
 from labcrane.analysis.report.style import COLOURS, HIGH, new_figure, styled
 from labcrane.analysis.statistics.fitts import Regression, mean_line, regress
 from labcrane.analysis.statistics.learning import CURVES
+from labcrane.analysis.statistics.trends import LEAST
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -36,9 +38,6 @@ MEANS = (
     "Points: means over participants' means, bars: 95 % confidence intervals (t) for three or "
     "more participants,"
 )
-LEAST = 3
-"""Minimum participants of a mean with a bar: of two, it is a multiple of their difference."""
-
 MOST_NAMED = 60
 """Maximum number of participants with names in a figure; more would fill a page."""
 
@@ -108,8 +107,7 @@ def by_sequence(
     """
     few = tested is not None and 0 < len(tested) < len(movements)
     whose = tested if few and tested is not None else movements
-    each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
-    series = [Series(_numbers(each.index), _numbers(each[name]), FAINT, "line") for name in each]
+    series = _thin(movements, measure)
     groups = movements["group"].nunique() > 1
     by = ["group", "sequence"] if groups else ["sequence"]
     table = over(whose, measure, by)
@@ -124,6 +122,12 @@ def by_sequence(
         f"{_at(table)}; thin lines: each of {_all(movements)}."
     )
     return Drawing(f"{measure}_by_sequence", caption, [panel], table)
+
+
+def _thin(movements: "pd.DataFrame", measure: str) -> list[Series]:
+    """Return a line for each participant."""
+    each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
+    return [Series(_numbers(each.index), _numbers(each[who]), FAINT, "line") for who in each]
 
 
 def _by_phase(movements: "pd.DataFrame", table: "pd.DataFrame") -> "list[pd.DataFrame]":
@@ -244,7 +248,7 @@ def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) ->
     panel = Panel(PLACE_WORDS, WORDS.get(measure, measure), series)
     caption = (
         f"Learning curves of {_begun(WORDS.get(measure, measure)).lower()}. Dots: each "
-        f"participant's means, n = {len(people)} {_people(len(people))}; lines: the better of an "
+        f"participant's means, n = {counted(len(people), 'participant')}; lines: the better of an "
         "exponential and a power curve"
         + ("." if drawn else ", which cannot be fitted to so few positions.")
     )
@@ -258,9 +262,7 @@ def sticks(movements: "pd.DataFrame") -> Drawing:
     panels, tables = [], []
     for measure in ("simultaneous", "bimanual", "reversals"):
         table = over(movements, measure, ["sequence"])
-        each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
-        thin = [Series(_numbers(each.index), _numbers(each[one]), FAINT, "line") for one in each]
-        drawn = [*thin, _with_ci(table, COLOURS[0])]
+        drawn = [*_thin(movements, measure), _with_ci(table, COLOURS[0])]
         keep = None if measure == "reversals" else FRACTION
         panels.append(Panel(PLACE_WORDS, WORDS[measure], drawn, keep=keep))
         tables.append(table.assign(measure=measure))
@@ -276,7 +278,7 @@ def throughputs(table: "pd.DataFrame") -> Drawing:
     mean, count = float(table["throughput"].mean()), len(table)
     caption = (
         f"Throughput: mean over distances and widths of targets. Dots: each participant, "
-        f"n = {count} {_people(count)}; "
+        f"n = {counted(count, 'participant')}; "
         f"line: their mean, {mean:.3f} bit/s."
     )
     return Lines("throughput", caption, (), table)
@@ -293,14 +295,9 @@ def _begun(words: str) -> str:
     return words[:1].upper() + words[1:].partition(" (")[0]
 
 
-def _people(count: int) -> str:
-    return "participant" if count == 1 else "participants"
-
-
 def _of(movements: "pd.DataFrame", by: str = "") -> str:
     """Return the number of participants, and their group."""
-    count = int(movements["participant"].nunique())
-    said = f"n = {count} {_people(count)}"
+    said = f"n = {_all(movements)}"
     if not by:
         return said
     sizes = movements.groupby(by)["participant"].nunique()
@@ -308,8 +305,7 @@ def _of(movements: "pd.DataFrame", by: str = "") -> str:
 
 
 def _all(movements: "pd.DataFrame") -> str:
-    count = int(movements["participant"].nunique())
-    return f"{count} {_people(count)}"
+    return counted(int(movements["participant"].nunique()), "participant")
 
 
 def _at(table: "pd.DataFrame") -> str:
@@ -325,7 +321,7 @@ def _aside(number: int, count: int) -> float:
 
 def _with_ci(table: "pd.DataFrame", colour: str, label: str = "") -> Series:
     below, above = table["mean"] - table["ci_low"], table["ci_high"] - table["mean"]
-    few = np.asarray(table["participants"], float) < LEAST
+    few = np.asarray(table["participants"], float) < LEAST  # the bar of two is of their difference
     reach = np.where(few, 0.0, np.nan_to_num(np.array([below, above], float)))
     return Series(
         _numbers(table["sequence"]), _numbers(table["mean"]), colour, label=label, reach=reach

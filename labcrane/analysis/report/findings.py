@@ -40,14 +40,14 @@ from labcrane.analysis.report.outcomes import (
     row_of,
 )
 from labcrane.analysis.statistics.anova import (
-    LEAST,
     Anova,
     FactorialDesign,
     analyse,
     word,
 )
 from labcrane.analysis.statistics.time_scales import FROM_BEFORE, adjusted, quantities, summary
-from labcrane.analysis.statistics.trends import Trend, holm, linear_trend
+from labcrane.analysis.statistics.trends import LEAST, Trend, holm, linear_trend
+from labcrane.errors import shortened
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 NOTHING = "nothing recorded"
 
 NAMED = 12
-"""Participants who are named in a sentence; tables list all."""
+"""Participants or movements named one by one in a sentence; tables list all."""
 
 SHOWN = 3
 """Cells without a value that are named; the others are only counted."""
@@ -463,7 +463,7 @@ class _PlanRun:
             ", ".join(f"{name} {word(level)}" for name, level in zip(names, cell, strict=True))
             for cell in sorted(lacks)
         ]
-        return f" at {_first(said)}"
+        return f" at {shortened(said, SHOWN, '; ')}"
 
     def _why(self, columns: tuple[str, ...]) -> str:
         """Return why an effect cannot be tested."""
@@ -484,17 +484,12 @@ class _PlanRun:
             if whole + single >= LEAST:
                 why += f", {single} of them alone in a group or in none"
             empty = [", ".join(map(word, cell)) for cell in self._cells.empty]
-            nobody = f"; no participant has one at {_first(empty)}" if empty else ""
+            nobody = f"; no participant has one at {shortened(empty, SHOWN, '; ')}" if empty else ""
             return f"{why}, and {LEAST} are needed{nobody}"
         groups = {self.factors.people.get(who, "") for who in self._cells.people}
         if len(groups) < 2 and GROUP in columns:  # noqa: PLR2004
             return f"all {whole} people with {have} are in group {groups.pop()}"
         return f"the {whole} people with {have} do not differ in the tested values"
-
-
-def _first(said: Sequence[str]) -> str:
-    more = f" and {len(said) - SHOWN} more" if len(said) > SHOWN else ""
-    return "; ".join(said[:SHOWN]) + more
 
 
 def _cells_of(table: "pd.DataFrame", names: Sequence[str]) -> defaultdict[str, set[Cell]]:
@@ -523,7 +518,7 @@ def without_people(reasons: Mapping[str, str], people: Collection[str]) -> tuple
 def people_in_words(names: Sequence[str]) -> str:
     """Return names in words: ``P001, P002 and P003``."""
     if len(names) > NAMED:
-        return f"{', '.join(names[:NAMED])} and {len(names) - NAMED} more"
+        return shortened(names, NAMED)
     *others, last = sorted(names)
     return f"{', '.join(others)} and {last}" if others else last
 

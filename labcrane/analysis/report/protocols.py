@@ -9,6 +9,7 @@ from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.report.sample import counted
 from labcrane.files.yaml import parse_yaml
 
 if TYPE_CHECKING:
@@ -61,11 +62,11 @@ def in_words(unlike: "pd.DataFrame") -> str:
     places = unlike["place"].unique()
     first = unlike[unlike["place"] == places[0]]
     values = " and ".join(
-        f"{value} in {count} {'session' if count == 1 else 'sessions'}"
+        f"{value} in {counted(count, 'session')}"
         for value, count in zip(first["value"], first["n"], strict=True)
     )
     more = len(places) - 1
-    others = f", and {more} more {'place' if more == 1 else 'places'}" if more else ""
+    others = f", and {counted(more, 'more place')}" if more else ""
     return (
         f"Not all sessions were run by the same protocol: {places[0]} was {values}{others}; the "
         "table of protocols says who had which. The averages are over all of them."

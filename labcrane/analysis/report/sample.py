@@ -64,10 +64,14 @@ def _counts(words: Sequence[str]) -> str:
     return ", ".join(f"{count} {word}" for word, count in sorted(Counter(words).items()))
 
 
+def counted(number: int, noun: str) -> str:
+    """Return ``1 participant``, or ``3 participants``."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def in_words(table: "pd.DataFrame") -> str:
     """Return the sample in a sentence, with the number of known answers."""
     row = table.iloc[0].to_dict()
-    parts = [f"{row['n']} participant{'' if row['n'] == 1 else 's'}"]
     about = []
     item = next((item for item in GENDERS if row.get(item)), "")
     if item:
@@ -79,5 +83,5 @@ def in_words(table: "pd.DataFrame") -> str:
         known = f", of {row['age_answers']} who said it" if row["age_answers"] < row["n"] else ""
         about.append(f"{low:g} to {high:g} years old, M = {row['age_mean']:.2f}{sd}{known}")
     groups = [f"{own['n']} in {own['group']}" for own in table.iloc[1:].to_dict("records")]
-    text = parts[0] + (f" ({'; '.join(about)})" if about else "")
+    text = counted(row["n"], "participant") + (f" ({'; '.join(about)})" if about else "")
     return text + (f": {', '.join(groups)}." if groups else ".")

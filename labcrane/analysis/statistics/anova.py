@@ -8,14 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane.analysis.statistics.trends import holm
+from labcrane.analysis.statistics.trends import LEAST, holm
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
-
-LEAST = 3
-"""Fewest participants of a test; with fewer, their variance is unknown."""
 
 NO_VARIANCE = 1e-20
 """Share of all squares that rounding leaves where participants are all alike."""

@@ -24,6 +24,7 @@ import numpy as np
 from labcrane.analysis.statistics.anova import alone
 from labcrane.analysis.statistics.confounding import dummies
 from labcrane.analysis.statistics.rounding import alike
+from labcrane.analysis.statistics.trends import LEAST
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -50,9 +51,6 @@ TIMES = (
     "main_stroke_time",
 )  # fmt: skip
 """Times are above 0 and skewed to the right: their logarithm is modelled."""
-
-LEAST = 3
-"""Participants of a model."""
 
 DEPENDENT = 1e-8
 """Residual share of a column given those before it; below it, it is linearly dependent."""

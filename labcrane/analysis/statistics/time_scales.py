@@ -13,13 +13,11 @@ import numpy as np
 
 from labcrane.analysis.statistics.confounding import dummies
 from labcrane.analysis.statistics.rounding import alike, without_rounding
+from labcrane.analysis.statistics.trends import LEAST
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
-
-LEAST = 3
-"""Participants of a test."""
 
 QUANTITIES = {
     "slope": "change per position within it, least squares",

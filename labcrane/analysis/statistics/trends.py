@@ -12,6 +12,9 @@ from labcrane.analysis.statistics.rounding import alike, without_rounding
 if TYPE_CHECKING:
     import pandas as pd
 
+LEAST = 3
+"""Fewest participants of a test; with fewer, their variance is unknown."""
+
 
 @dataclass(frozen=True, slots=True)
 class Trend:
@@ -68,7 +71,7 @@ def linear_trend(movements: "pd.DataFrame", measure: str) -> Trend | None:
         if len(means) > 1:
             found.append(float(np.polyfit(means.index.to_numpy(float), means.to_numpy(), 1)[0]))
             people.append(str(name))
-    if len(found) < 3:  # noqa: PLR2004 - no test with fewer
+    if len(found) < LEAST:
         return None
     slopes = without_rounding(np.array(found), movements[measure].dropna().to_numpy(float))
     if alike(slopes):

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from labcrane.errors import StreamError
+from labcrane.errors import StreamError, shortened
 from labcrane.streams.network import Network, describe, free_ports, port_range
 from labcrane.streams.request import OURS, StreamRequest
 
@@ -77,9 +77,8 @@ def cause(
         if not one.name().startswith(OURS)
     )
     if others:
-        more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
         return (
-            f"the network has {', '.join(others[:MOST_NAMED])}{more}; correct the protocol if "
+            f"the network has {shortened(others, MOST_NAMED)}; correct the protocol if "
             "one of them is meant, otherwise start its program; labcrane doctor --peer ADDRESS "
             "shows whether a firewall blocks it"
         )
