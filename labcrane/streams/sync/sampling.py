@@ -8,9 +8,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 
-from labcrane.streams.sync.stamping import holes, levels, receipt, shifts, strays, units
-from labcrane.streams.sync.stamping.late_chunks import lost_before, lost_between, slope, soonest
+from labcrane.streams.sync.stamping import holes, levels, receipt, shifts, units
+from labcrane.streams.sync.stamping.late_chunks import lost_before, lost_between, slope
 from labcrane.types import FloatArray
 
 FEW = 20
@@ -18,6 +19,12 @@ BLOCKS = 200
 MANY, SPAN = 400, 150
 CLUMPED = 0.5
 """Where the usual step is less than this part of the period, samples are stamped in bursts."""
+
+NEARLY_ALL = 1.35
+"""Of what scatters by chance, 99 % are within so many times what 95 % are within."""
+
+AROUND = 4
+"""The level of most of so many blocks before and after is that of a steady clock."""
 
 BURST = 1.0 / 3.0
 """No sampler goes faster for a while by more: what seems to is sent behind a stall."""
@@ -35,7 +42,6 @@ SAME = 0.5
 EARLIER = 0.1
 """At least this part of chunks stamped when sent waited for less than the one before."""
 
-DELAYS = 0.25
 RATE_CHANGE = 1e-3
 PIECES = 8
 """So many pieces at least tell a changing rate."""
@@ -43,9 +49,6 @@ PIECES = 8
 LEAST_NOISE_S = 5e-5
 WITHIN = 0.75
 """Stamps on a grid scatter by half of its unit; what scatters by more was not taken evenly."""
-
-FEW_CHUNKS = 3
-"""In so many samples, or chunks, stamps that scatter by chance show how far they do."""
 
 BEHIND_S = 1e-6
 """An irregular sample is out of order when it is stamped by more than this before another."""
@@ -76,8 +79,6 @@ class Sampling:
         so, or scatter as their grid lets them.
     grid_s
         Unit that stamps are cut or rounded to; 0 where they are not.
-    reach_s
-        By how much a few neighbouring samples, or chunks, differ from evenly spaced ones.
     late_stamps
         Whether whole chunks are stamped when they are sent: an unknown delay lies in all of them.
     steady
@@ -98,16 +99,14 @@ class Sampling:
     uneven_s
         By how much stamps scatter about a steady clock, at 95 %, that are taken to be right: as
         samples of an uneven sampler are, and those which are late by delays to both sides alike.
-    strayed
-        By how much each sample is stamped beside its count for a while, shape ``(n,)``; None where
-        none is.
+    scatter_s
+        How far each sample is stamped beside a steady clock, shape ``(n,)``, at least what nearly
+        all are: it was taken so, or stamped so, and nothing tells.
     breaks
         The samples behind holes of which nothing shows how many periods they are.
     unsure_s
         By how much samples near a loss may be off, shape ``(n,)``: which of them came before it is
         not known.
-    kept_s
-        Scatter of timestamps, as arrivals show, that could not be dejittered.
     back_s
         By how much the clock of an irregular stream without arrivals may have been set back.
     behind
@@ -122,7 +121,6 @@ class Sampling:
     rates_hz: tuple[float, ...] = ()
     noise_s: float = 0.0
     grid_s: float = 0.0
-    reach_s: float = 0.0
     late_stamps: bool = False
     steady: bool = False
     uncounted: bool = False
@@ -133,40 +131,16 @@ class Sampling:
     longest_stall_s: float = 0.0
     index: FloatArray = field(default_factory=lambda: np.empty(0))
     uneven_s: float = 0.0
-    strayed: FloatArray | None = None
+    scatter_s: FloatArray | float = 0.0
     breaks: npt.NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     unsure_s: FloatArray | float = 0.0
     back_s: float = 0.0
-    kept_s: float = 0.0
     behind: int = 0
 
     @property
     def rate_hz(self) -> float:
         """Samples per second, while they flowed."""
         return 1.0 / self.period
-
-    def judged_by(self, moved: FloatArray) -> "Sampling":
-        """Return it as steady only if evening moved samples as far as stamping noise scatters.
-
-        Noise is new in each stamp, so that a few neighbours show all of it. What adds up beyond
-        that is the sampler's own, as of a camera that takes longer in the dark. What arrivals show
-        to be noise stays noise, as far as neighbours show it, though nothing takes it away.
-
-        Parameters
-        ----------
-        moved
-            By how much, in seconds, shape ``(n,)``.
-        """
-        if self.received is not None:
-            return self
-        by_grid = self.grid_s > 0.0 and not self.noise_s
-        allowed = WITHIN * self.grid_s if by_grid else self.reach_s
-        if float(np.quantile(np.abs(moved), 0.95)) <= allowed:
-            return self
-        kept = 0.0 if self.late_stamps else min(self.noise_s, self.reach_s)
-        return replace(
-            self, noise_s=0.0, kept_s=kept, late_stamps=False, steady=False, unplaced=False
-        )
 
 
 def examine(
@@ -214,8 +188,8 @@ def examine(
     grid = 0.0 if _on_grid(found, stamps[order], grid) else grid
     shifted = found.exact and len(found.shifted.at) > 0
     level, blurred = None, False
-    if probed and not disordered and not grid and not shifted:
-        explained = found.computed and not found.missing and not found.clumped
+    explained = found.computed and not found.missing and not found.clumped
+    if probed and not disordered and not grid and not shifted and not explained:
         blurred = counter is None and (found.clumped or not (found.exact or found.computed))
         if blurred:
             find = levels.of_packets if found.clumped else levels.find
@@ -223,7 +197,7 @@ def examine(
         sure = slice(None)
         if level is not None:
             index, sure = index + level.lost, level.unsure == 0.0
-        waited = receipt.find(time[sure], index[sure], explained=explained)
+        waited = receipt.find(time[sure], index[sure])
         if waited is not None:
             longer = np.diff(index) > 1.5  # noqa: PLR2004
             return Sampling(
@@ -241,8 +215,8 @@ def examine(
                 unsure_s=0.0 if level is None else level.unsure * waited.period,
                 uncounted=blurred and level is None,
             )
-    noise, late, by_grid, uneven = _noise(time, arrival, found, grid)
     rates = _rates(found)
+    noise, late, by_grid, uneven, scatter = _noise(time, arrival, found, grid)
     steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
     unplaced = late and counter is None and (found.clumped or found.missing > 0)
     return Sampling(
@@ -254,7 +228,6 @@ def examine(
         rates_hz=rates,
         noise_s=noise,
         grid_s=grid,
-        reach_s=_reach(found),
         late_stamps=late,
         steady=steady,
         uncounted=blurred and level is None,
@@ -264,7 +237,7 @@ def examine(
         longest_stall_s=longest,
         index=index if disordered else found.index,
         uneven_s=uneven,
-        strayed=None if disordered or rates else found.strayed,
+        scatter_s=scatter if not rates else uneven,
         breaks=found.breaks,
     )
 
@@ -331,9 +304,7 @@ class _Steps:
     exact: bool
     computed: bool
     clumped: bool
-    balance: float
     shifted: shifts.Shifts
-    strayed: FloatArray | None
 
 
 def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -> _Steps:
@@ -348,7 +319,7 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
     scatter = 1.4826 * float(np.median(np.abs(rest)))
     odd = float((np.abs(rest) > WHOLE * local).mean())
     exact = scatter < EXACT * float(np.median(local)) and odd < 0.01  # noqa: PLR2004
-    same, balance, in_chunks = _chunks(steps, counts * local)
+    same, in_chunks = _chunks(steps, counts * local)
     # Steps are computed by one rate, whatever the clock that stamps the chunks does meanwhile.
     one_rate = bool(np.ptp(np.quantile(local, (0.1, 0.9))) < RATE_CHANGE * typical)
     computed = clumped or (not grid and in_chunks and one_rate)
@@ -383,34 +354,26 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
             position = position + np.repeat(before, np.diff(np.r_[first, len(time)]))
             missing += max(int(before[-1]), 1)
     longest = float(steps[gaps].max(initial=0.0))
-    strayed = None
-    # A long hole may be off by a part of a period, and what is behind it seem to stray.
-    if exact and not grid and not len(breaks) and float(whole.max()) < strays.LONG_HOLE:
-        strayed = strays.find(flowed, position, usual, scatter)
-    if strayed is not None:
-        mean = slope(position[strayed == 0.0], flowed[strayed == 0.0])
     return _Steps(
         time, flowed, breaks + 1, mean, local, position, missing, int(gaps.sum()), longest, exact,
-        computed, clumped, balance, shifted, strayed,
+        computed, clumped, shifted,
     )  # fmt: skip
 
 
-def _chunks(steps: FloatArray, usual: FloatArray) -> tuple[npt.NDArray[np.bool_], float, bool]:
-    """Return which steps are usual ones, how far others add up, and whether these part chunks.
+def _chunks(steps: FloatArray, usual: FloatArray) -> tuple[npt.NDArray[np.bool_], bool]:
+    """Return which steps are usual ones, and whether the others part chunks.
 
     Steps of chunks stamped when sent differ by their delays, which do not add up.
     """
     same = np.abs(steps - usual) < EQUAL_S
     boundary = (steps - usual)[~same]
-    moved = float(np.abs(boundary).sum())
-    balance = abs(float(boundary.sum())) / moved if moved > 0.0 else 0.0
     between = boundary / usual[~same]
     fraction = np.abs(between - np.round(between)) > 0.05 if len(between) else np.zeros(0, bool)  # noqa: PLR2004
     repeated = same.mean() > SAME and len(boundary) >= FEW and fraction.mean() > 0.5  # noqa: PLR2004
     # A chunk that waits for longer than the one before comes late, the next one early.
     early = boundary < -EQUAL_S
     both_ways = len(early) > 0 and float(early.mean()) > EARLIER
-    return same, balance, bool(repeated and both_ways)
+    return same, bool(repeated and both_ways)
 
 
 def _typical(time: FloatArray, index: FloatArray) -> float:
@@ -453,15 +416,11 @@ def _is_shuffled(steps: FloatArray, in_order: FloatArray) -> bool:
 
 def _rates(found: _Steps) -> tuple[float, ...]:
     """Return the rates at first and at last where they differ by more than stamps scatter."""
-    edges = np.linspace(0, len(found.time) - 1, 41).astype(int)
-    if found.strayed is not None:
-        own = np.flatnonzero(found.strayed == 0.0)
-        edges = np.unique(own[np.minimum(np.searchsorted(own, edges), len(own) - 1)])
-    blurred = 0.0
     if found.computed:
-        edges, blurred = soonest(found.flowed, found.period, found.index)
+        return ()
+    edges = np.linspace(0, len(found.time) - 1, 41).astype(int)
     span = np.diff(found.index[edges])
-    if len(span) < PIECES or (span <= 0).any() or (found.computed and found.balance >= DELAYS):
+    if len(span) < PIECES or (span <= 0).any():
         return ()
     if not (np.diff(found.flowed[edges]) > 0.0).all():  # stamps stood still, or went back
         return ()
@@ -470,8 +429,7 @@ def _rates(found: _Steps) -> tuple[float, ...]:
     ends = [float(np.median(part)) for part in (rate[:4], rate[-4:])]
     mean = float(np.median(rate))
     low, high = np.quantile(rate, (0.05, 0.95))
-    blurred *= mean / float(np.diff(found.flowed[edges]).min())
-    if high - low < max(RATE_CHANGE * mean, 8.0 * scatter, blurred):
+    if high - low < max(RATE_CHANGE * mean, 8.0 * scatter):
         return ()
     if found.exact or abs(ends[1] - ends[0]) > RATE_CHANGE * mean:
         return 1.0 / ends[0], 1.0 / ends[1]
@@ -480,11 +438,12 @@ def _rates(found: _Steps) -> tuple[float, ...]:
 
 def _noise(
     time: FloatArray, arrival: FloatArray | None, found: _Steps, grid: float
-) -> tuple[float, bool, bool, float]:
+) -> tuple[float, bool, bool, float, FloatArray | float]:
     """Return by how much the stamps scatter that were not taken so, and why.
 
     The second is whether they are late, the third whether only their grid lets them scatter, the
-    last by how much those scatter that were taken so, for all that is known.
+    fourth by how much those scatter that were taken so, for all that is known, and the last how far
+    each of them is beside a steady clock.
 
     Stamps that are computed, of a coarse clock, or unlike the arrivals of their samples were not
     taken when the samples were.
@@ -496,7 +455,8 @@ def _noise(
     count = max(len(rest) // size, 1)
     blocks = np.array_split(rest, count)
     middle = np.cumsum([len(block) for block in blocks]) - len(blocks[0]) / 2
-    level = np.interp(np.arange(len(rest)), middle, [float(np.median(block)) for block in blocks])
+    usual = np.array([float(np.median(block)) for block in blocks])
+    level = np.interp(np.arange(len(rest)), middle, usual)
     apart = np.abs(rest - level)
     spread = float(np.quantile(apart, 0.95))
     if found.computed:
@@ -505,11 +465,16 @@ def _noise(
             True,
             False,
             0.0,
+            0.0,
         )
     if grid and spread <= WITHIN * grid:
-        return 0.0, False, True, 0.0
-    if spread < max(LEAST_NOISE_S, 0.005 * found.period):
-        return 0.0, False, False, 0.0
+        return 0.0, False, True, 0.0, 0.0
+    least = max(LEAST_NOISE_S, 0.005 * found.period)
+    if min(spread, 3.0 * float(np.median(apart))) < least:  # but for some
+        around = np.pad(usual, AROUND, "reflect", reflect_type="odd")
+        usual = np.median(sliding_window_view(around, 2 * AROUND + 1), axis=1)
+        apart = np.abs(rest - np.interp(np.arange(len(rest)), middle, usual))
+        return 0.0, False, False, 0.0, np.where(apart < least, 0.0, apart)
     if arrival is not None and len(arrival) == len(rest) and found.time is time:
         late = arrival - time + (rest - level)  # what arrival does on top of a steady clock
         own = rest - level
@@ -517,23 +482,8 @@ def _noise(
         share = float(own[near] @ (late - late.mean())[near]) / float(own[near] @ own[near])
         doubt = float(late.std()) / (float(own[near].std()) * np.sqrt(near.sum()))
         if share + 3.0 * doubt < 1.0 - UNLIKE and share < UNLIKE:
-            return spread, False, False, 0.0
-    return 0.0, False, False, spread
-
-
-def _reach(found: _Steps) -> float:
-    """Return by how much a few neighbouring samples, or chunks, differ from evenly spaced ones."""
-    size = FEW_CHUNKS
-    if found.computed:
-        steps = np.diff(found.time)
-        bursts = bool(np.median(steps) < CLUMPED * np.median(found.local))
-        count = int(np.count_nonzero(steps > found.local)) if bursts else _boundaries(found)
-        size *= max(len(found.time) // max(count, 1), 1)
-    rest = found.flowed - found.period * (found.index - found.index[0])
-    whole = len(rest) // size * size
-    return (
-        float(np.quantile(np.ptp(rest[:whole].reshape(-1, size), axis=1), 0.95)) if whole else 0.0
-    )
+            return spread, False, False, 0.0, 0.0
+    return 0.0, False, False, spread, np.maximum(apart, NEARLY_ALL * spread)
 
 
 def _boundaries(found: _Steps) -> int:
@@ -542,19 +492,16 @@ def _boundaries(found: _Steps) -> int:
 
 
 def coarse_unit(stamps: FloatArray, *, regular: bool) -> float:
-    """Return the unit of a coarse clock of which stamps are whole ones apart; 0 if there is none.
-
-    Or the ticks that are expressed in it, if these are longer.
-    """
+    """Return the unit of a coarse clock of which stamps are whole ones apart; 0 if none."""
     unit = units.find(stamps)
     if not unit:
         return 0.0
     if not regular or len(stamps) < 2:  # noqa: PLR2004
-        return units.tick(stamps, unit, 0.0)
+        return unit
     period = _typical(np.sort(stamps), np.arange(float(len(stamps))))
     if abs(unit - period) < RATE_CHANGE * period:  # all steps are of one sample, or of some
         return 0.0
-    return units.tick(stamps, unit, period)
+    return unit
 
 
 def _on_grid(found: _Steps, stamps: FloatArray, grid: float) -> bool:

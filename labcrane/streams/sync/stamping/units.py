@@ -18,12 +18,6 @@ TOLD_S = 1e-6
 MANY = 2000
 """So many different steps show what all of them are multiples of."""
 
-SEVERAL = 4.0
-"""A tick is longer than the unit that it is expressed in, by so much at least."""
-
-NEARLY = 0.01
-"""A tick so near to a part of the period is the sampler's."""
-
 WHOLE = 1e-3
 FEW = 0.25
 """What is blurred by more than this part of a unit tells nothing of it."""
@@ -45,27 +39,6 @@ def find(stamps: FloatArray) -> float:
             if LEAST_S <= unit <= MOST_S:
                 return unit
     return 0.0
-
-
-def tick(stamps: FloatArray, unit: float, period: float) -> float:
-    """Return the ticks that are expressed in a coarse unit; the unit where it is the tick.
-
-    Parameters
-    ----------
-    stamps
-        Of whole ``unit``, in seconds, shape ``(n,)``.
-    unit
-        In seconds.
-    period
-        Of a regular stream; 0 of others.
-    """
-    longer = _common(_steps(stamps, unit / 2.0), 1.01 * unit)
-    if not SEVERAL * unit < longer <= MOST_S:
-        return unit
-    longer = _refined(stamps, longer, 1.05 * unit / longer)
-    parts = period / longer if longer else 0.0
-    by_sampler = period > 0.0 and abs(parts - max(round(parts), 1)) < NEARLY * max(parts, 1.0)
-    return unit if not longer or by_sampler else longer
 
 
 def _steps(stamps: FloatArray, blur: float) -> FloatArray:
