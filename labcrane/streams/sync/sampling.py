@@ -169,58 +169,39 @@ def examine(
     pauses
         Whether the sampler is declared to pause.
     """
+    counted = counter is not None
     index = np.arange(len(time), dtype=np.float64) if counter is None else counter
     stalls, longest = _stalls(time, arrival)
+    told = Sampling(index=index, stalls=stalls, longest_stall_s=longest)
     if len(time) < FEW:
-        return Sampling(index=index, stalls=stalls, longest_stall_s=longest)
-    order = np.argsort(time, kind="stable")
-    behind = int(np.count_nonzero(np.diff(np.maximum.accumulate(time)) == 0.0))
-    sorted_steps = np.diff(time[order])
-    disordered = behind if _is_shuffled(np.diff(time), sorted_steps) else 0
+        return told
+    order, disordered = np.arange(len(time)), 0
+    if _is_shuffled(np.diff(time)):
+        order = np.argsort(time, kind="stable")
+        disordered = int(np.count_nonzero(np.diff(np.maximum.accumulate(time)) == 0.0))
     grid = coarse_unit(stamps, regular=True)
-    if disordered:
-        counts = index if counter is None else counter[order]  # who has none counts as they stand
-        found = _steps(time[order], counts, grid, counted=counter is not None)
-    else:
-        found = _steps(time, index, grid, counted=counter is not None)
-    if pauses:
-        found = replace(found, shifted=found.shifted.without_pauses())
-    grid = 0.0 if _on_grid(found, stamps[order], grid) else grid
-    shifted = found.exact and len(found.shifted.at) > 0
-    level, blurred = None, False
+    # Who has no counter counts as they stand.
+    found = _steps(time[order], index[order] if counted else index, grid, counted=counted)
+    shifted = found.shifted.without_pauses() if pauses else found.shifted
+    grid = 0.0 if _on_grid(found, np.sort(stamps) if disordered else stamps, grid) else grid
+    level, uncounted = None, False
     explained = found.computed and not found.missing and not found.clumped
-    if probed and not disordered and not grid and not shifted and not explained:
-        blurred = counter is None and (found.clumped or not (found.exact or found.computed))
-        if blurred:
-            find = levels.of_packets if found.clumped else levels.find
-            level = find(time, found.period)
-        sure = slice(None)
-        if level is not None:
-            index, sure = index + level.lost, level.unsure == 0.0
-        waited = receipt.find(time[sure], index[sure])
+    exact_shift = found.exact and len(shifted.at) > 0
+    if probed and not (disordered or grid or exact_shift or explained):
+        if not counted and (found.clumped or not (found.exact or found.computed)):
+            level = (levels.of_packets if found.clumped else levels.find)(time, found.period)
+            uncounted = level is None
+        told = replace(told, uncounted=uncounted)
+        waited = _received(told, time, level)
         if waited is not None:
-            longer = np.diff(index) > 1.5  # noqa: PLR2004
-            return Sampling(
-                waited.period,
-                missing=int((np.diff(index)[longer] - 1.0).sum()),
-                gaps=int(np.count_nonzero(longer)),
-                longest_gap_s=float(np.diff(time)[longer].max(initial=0.0)),
-                noise_s=waited.spread_s,
-                late_stamps=True,
-                steady=True,
-                received=waited,
-                stalls=stalls,
-                longest_stall_s=longest,
-                index=index,
-                unsure_s=0.0 if level is None else level.unsure * waited.period,
-                uncounted=blurred and level is None,
-            )
+            return waited
     rates = _rates(found)
-    noise, late, by_grid, uneven, scatter = _noise(time, arrival, found, grid)
-    steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
-    unplaced = late and counter is None and (found.clumped or found.missing > 0)
-    return Sampling(
-        found.period,
+    noise, late, by_grid, uneven, scatter = _noise(
+        time, None if disordered else arrival, found, grid
+    )
+    return replace(
+        told,
+        period=found.period,
         missing=found.missing if level is None else int(level.lost[-1]),
         gaps=found.gaps,
         longest_gap_s=found.longest,
@@ -229,16 +210,37 @@ def examine(
         noise_s=noise,
         grid_s=grid,
         late_stamps=late,
-        steady=steady,
-        uncounted=blurred and level is None,
-        unplaced=unplaced,
-        shifted=found.shifted,
-        stalls=stalls,
-        longest_stall_s=longest,
+        steady=(noise > LEAST_NOISE_S or by_grid) and not disordered and not rates,
+        unplaced=late and not counted and (found.clumped or found.missing > 0),
+        shifted=shifted,
         index=index if disordered else found.index,
         uneven_s=uneven,
-        scatter_s=scatter if not rates else uneven,
+        scatter_s=uneven if rates else scatter,
         breaks=found.breaks,
+    )
+
+
+def _received(told: Sampling, time: FloatArray, level: levels.Levels | None) -> Sampling | None:
+    """Return a stream as one whose samples waited; None where nothing shows that they did."""
+    index, unsure = told.index, np.zeros(len(time))
+    if level is not None:
+        index, unsure = index + level.lost, level.unsure
+    waited = receipt.find(time[unsure == 0.0], index[unsure == 0.0])
+    if waited is None:
+        return None
+    longer = np.diff(index) > 1.5  # noqa: PLR2004
+    return replace(
+        told,
+        period=waited.period,
+        missing=int((np.diff(index)[longer] - 1.0).sum()),
+        gaps=int(np.count_nonzero(longer)),
+        longest_gap_s=float(np.diff(time)[longer].max(initial=0.0)),
+        noise_s=waited.spread_s,
+        late_stamps=True,
+        steady=True,
+        received=waited,
+        index=index,
+        unsure_s=unsure * waited.period,
     )
 
 
@@ -403,15 +405,16 @@ def _local(steps: FloatArray) -> FloatArray:
     return np.asarray(np.interp(np.arange(len(steps)), middle, usual))
 
 
-def _is_shuffled(steps: FloatArray, in_order: FloatArray) -> bool:
+def _is_shuffled(steps: FloatArray) -> bool:
     """Whether samples fall in place when they are put in the order of their stamps."""
     if not (steps < 0.0).any():
         return False
+    in_order = np.diff(np.sort(np.r_[0.0, np.cumsum(steps)]))
     usual = float(np.median(in_order))
     odd, left = (
-        int(np.count_nonzero(np.abs(each - usual) > WHOLE * usual)) for each in (steps, in_order)
+        np.count_nonzero(np.abs(each - usual) > WHOLE * usual) for each in (steps, in_order)
     )
-    return left < 0.5 * odd
+    return bool(left < 0.5 * odd)
 
 
 def _rates(found: _Steps) -> tuple[float, ...]:
@@ -475,7 +478,7 @@ def _noise(
         usual = np.median(sliding_window_view(around, 2 * AROUND + 1), axis=1)
         apart = np.abs(rest - np.interp(np.arange(len(rest)), middle, usual))
         return 0.0, False, False, 0.0, np.where(apart < least, 0.0, apart)
-    if arrival is not None and len(arrival) == len(rest) and found.time is time:
+    if arrival is not None:
         late = arrival - time + (rest - level)  # what arrival does on top of a steady clock
         own = rest - level
         near = apart < 4.0 * spread

@@ -68,52 +68,44 @@ def judge_stream(
 ) -> StreamReport:
     """Judge a corrected stream, with what the recorder noted beside it."""
     quality = replace(quality, dropped=max(quality.dropped, _missing(recorded)))
-    samples = len(recorded.time_raw)
-    header = recorded.header
+    samples, rate_hz = len(recorded.time_raw), recorded.header.rate_hz
     if samples == 0:
         findings = [_empty(required=required)]
     else:
-        findings = judge_quality(quality, header.rate_hz, samples, limits, required=required)
-    findings += _noted(recorded) + _unwritten(recorded)
-    return StreamReport(
-        header.name,
-        header.type,
-        header.source_id,
-        worst(finding.verdict for finding in findings),
-        samples,
-        header.rate_hz,
-        quality,
-        tuple(findings),
-        tuple(sorted(faults(quality, header.rate_hz))) if samples else (),
-        tuple(corrections(quality)),
-        unknowable(quality) if _probed_in_full(recorded) else UNWRITTEN,
-        carries(quality) + ("" if len(recorded.arrivals) or not samples else IF_ITS_OWN),
-        _taken(recorded),
+        findings = judge_quality(quality, rate_hz, samples, limits, required=required)
+    return replace(
+        _report(recorded, quality, [*findings, *_noted(recorded), *_unwritten(recorded)]),
+        faults=tuple(sorted(faults(quality, rate_hz))) if samples else (),
+        corrected=tuple(corrections(quality)),
+        unknown=unknowable(quality) if _probed_in_full(recorded) else UNWRITTEN,
+        carries=carries(quality) + ("" if len(recorded.arrivals) or not samples else IF_ITS_OWN),
     )
 
 
 def uncorrected_stream(recorded: RecordedStream, why: str) -> StreamReport:
     """Return the report of a stream whose times could not be corrected."""
-    header, samples, quality = recorded.header, len(recorded.time_raw), Quality()
     finding = Finding(
         Verdict.FAIL,
         f"its clock could not be corrected: {why}",
         "its times are uncorrected; after mending the cause, run labcrane resync",
     )
+    return _report(recorded, Quality(), [finding, *_noted(recorded)])
+
+
+def _report(recorded: RecordedStream, quality: Quality, findings: list[Finding]) -> StreamReport:
+    header = recorded.header
     return StreamReport(
-        header.name,
-        header.type,
-        header.source_id,
-        Verdict.FAIL,
-        samples,
-        header.rate_hz,
-        quality,
-        (finding, *_noted(recorded)),
-        (),
-        (),
-        unknowable(quality),
-        carries(quality),
-        _taken(recorded),
+        name=header.name,
+        type=header.type,
+        source_id=header.source_id,
+        verdict=worst(finding.verdict for finding in findings),
+        samples=len(recorded.time_raw),
+        nominal_hz=header.rate_hz,
+        quality=quality,
+        findings=tuple(findings),
+        unknown=unknowable(quality),
+        carries=carries(quality),
+        taken=_taken(recorded),
     )
 
 

@@ -81,9 +81,9 @@ def find(time: FloatArray, index: FloatArray) -> Receipt | None:
     away = np.arange(len(edges)) - (len(edges) - 1) / 2.0
     edges = edges - edges.mean() - away * float(away @ edges) / float(away @ away)
     strayed = float(np.abs(edges).max())
-    if strayed > STEADY * period:
+    late = _is_computed(np.diff(time)) or _is_late(rest)
+    if strayed > min(STEADY * period, 0.5 * spread):
         return None
-    late = _is_computed(np.diff(time)) or (strayed < 0.5 * spread and _is_late(rest))
     return Receipt(spread, period, strayed) if late else None
 
 

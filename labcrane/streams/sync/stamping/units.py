@@ -19,8 +19,6 @@ MANY = 2000
 """So many different steps show what all of them are multiples of."""
 
 WHOLE = 1e-3
-FEW = 0.25
-"""What is blurred by more than this part of a unit tells nothing of it."""
 
 
 def find(stamps: FloatArray) -> float:
@@ -51,29 +49,11 @@ def _steps(stamps: FloatArray, blur: float) -> FloatArray:
 
 
 def _common(steps: FloatArray, blur: float) -> float:
-    """Return what all steps are multiples of, by more than they are blurred; 0 if nothing.
-
-    The longer a step is, the better it tells what it is a multiple of, if it is known of which.
-    """
-    common, doubt = (float(steps[0]) if len(steps) else 0.0), blur
-    for step in map(float, steps):
-        longer, shorter = step, common
-        while True:
-            parts = round(longer / shorter)
-            allowed = blur + doubt * parts
-            if allowed > FEW * shorter:
-                break  # too long to tell
-            rest = abs(longer - parts * shorter)
-            if rest <= allowed:
-                if parts * blur and shorter == common and blur / parts < doubt:
-                    common, doubt = longer / parts, blur / parts
-                else:
-                    common = shorter
-                break
-            longer, shorter, doubt = shorter, rest, allowed
-            if shorter < LEAST_S:
-                return 0.0
-    return common
+    """Return the least by which steps differ from each other or from none; 0 without steps."""
+    if not len(steps):
+        return 0.0
+    apart = np.diff(steps)
+    return float(min(steps[0], apart[apart > blur].min(initial=np.inf)))
 
 
 def _refined(stamps: FloatArray, unit: float, nearly: float) -> float:
