@@ -27,7 +27,7 @@ def gives(value: Any) -> Callable[[Any], Callable[..., Any]]:
 
 
 LINKS: dict[str, tuple[str, str, Callable[[Any], Any]]] = {
-    "lost_between": ("sampling", "lost_between", lambda _: lambda i, r, p: (False, p)),
+    "lost_between": ("stamping.holes", "lost_between", lambda _: lambda i, r, p: (False, p)),
     "rates": ("sampling", "_rates", gives(())),
     "levels": ("stamping.levels", "find", gives(None)),
     "packets": ("stamping.levels", "of_packets", gives(None)),

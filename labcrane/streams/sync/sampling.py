@@ -11,7 +11,6 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from labcrane.streams.sync.stamping import holes, levels, receipt, shifts, units
-from labcrane.streams.sync.stamping.late_chunks import lost_before, lost_between, slope
 from labcrane.types import FloatArray
 
 FEW = 20
@@ -346,13 +345,13 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
     missing = int((whole - 1.0).sum())
     position = index if counted else index[0] + np.r_[0.0, np.cumsum(whole)]
     flowed = time - np.r_[0.0, np.cumsum(beyond - back)]
-    mean, usual = slope(position, flowed), float(np.median(local))
+    mean, usual = holes.slope(position, flowed), float(np.median(local))
     if computed and not clumped and not counted:
         first = np.r_[0, np.flatnonzero(~same) + 1]
         rest = time[first] - usual * position[first]
-        lost, mean = lost_between(position[first], rest, usual)
+        lost, mean = holes.lost_between(position[first], rest, usual)
         if lost:
-            before = lost_before(rest, usual)
+            before = holes.lost_before(rest, usual)
             position = position + np.repeat(before, np.diff(np.r_[first, len(time)]))
             missing += max(int(before[-1]), 1)
     longest = float(steps[gaps].max(initial=0.0))
