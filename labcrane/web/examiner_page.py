@@ -5,7 +5,7 @@ from typing import Any
 from labcrane.session.commands import Order
 from labcrane.web.control_room.snapshot import Snapshot
 from labcrane.web.form import ConsentCard, Form
-from labcrane.web.page import DRAFTS, PRIMARY, SEE_THROUGH, THEME, PageContext, prepare
+from labcrane.web.page import PRIMARY, PageContext, prepare
 from labcrane.web.panels import Cameras, Reports
 from labcrane.web.participant_page import STYLE as FORM_STYLE
 from labcrane.web.scene import SceneView
@@ -14,15 +14,7 @@ from labcrane.web.server.access import SUPERVISOR
 RATE_S = 0.25
 
 KEYS: tuple[tuple[str, str], ...] = (
-    ("Space", "start the next step, or continue after a pause"),
-    ("P", "pause"),
-    ("R", "repeat the running trial as a new attempt"),
-    ("S", "skip the running trial, break or questionnaire"),
-    ("E", "end the session"),
     ("N", "write a note"),
-    ("O", "override: let the trial continue past its automatic end"),
-    ("C", "the trial was completed"),
-    ("X", "the trial was not completed"),
     ("H", "write a hint to the operator"),
     ("F", "change a setting of a cue or sound"),
     ("T", "choose a stream, where a choice is needed"),
@@ -33,7 +25,7 @@ KEYS: tuple[tuple[str, str], ...] = (
     ("W", "on the wall: the status large enough for 3 m, and back"),
     ("?", "show these keys"),
 )
-"""What each key of the page does."""
+"""What each key of the page does that is not a button's."""
 
 
 def supervisor_page(context: PageContext) -> None:
@@ -46,7 +38,7 @@ def supervisor_page(context: PageContext) -> None:
     ui.colors(primary=PRIMARY)
     ui.add_css(STYLE)
     ui.add_css(FORM_STYLE)
-    prepare("en", THEME, DRAFTS, SEE_THROUGH)
+    prepare("en", "theme", "drafts", "see_through")
     snapshot = Snapshot(context, context.earlier)
 
     def give(order: str, text: str) -> str:

@@ -21,22 +21,7 @@ from labcrane.web.translations import WORDS, Words
 
 MOST_ORDERS_S = LIMITS["orders of one page"].most
 
-
-def _nothing() -> None:
-    """Do nothing."""
-
-
-DRAFTS = Path(__file__).with_name("drafts.js")
-"""Keeps unsaved text of a page when it is reloaded."""
-
-SEE_THROUGH = Path(__file__).with_name("see_through.js")
-"""Has nothing hidden on a page by what can be seen through."""
-
-THEME = Path(__file__).with_name("theme.js")
-"""Makes a page dark or light, as the computer is or as people choose."""
-
-STALE = Path(__file__).with_name("stale.js")
-"""Says that a page has heard nothing from its server for 2 s, and takes its buttons away."""
+HERE = Path(__file__).parent
 
 BEAT_S = 0.5
 """How often each page hears from its server."""
@@ -76,8 +61,8 @@ class PageContext:
     send: Callable[[Command], None]
     denied: Callable[[str], None]
     shown: ShownShapes
-    earlier: Earlier = field(default_factory=Earlier)
-    close: Callable[[], None] = _nothing
+    earlier: Earlier
+    close: Callable[[], None]
     buckets: dict[str, Bucket] = field(
         default_factory=lambda: {page: Bucket(MOST_ORDERS_S, 2 * MOST_ORDERS_S) for page in RIGHTS}
     )
@@ -107,18 +92,19 @@ class PageContext:
         return why
 
 
-def prepare(language: Language, *scripts: Path) -> None:
-    """Prepare the page that is being built, with these scripts.
+def prepare(language: Language, *scripts: str) -> None:
+    """Prepare the page that is being built, with the scripts of these names.
 
-    It states its language, by which screen readers pronounce, and when it is :data:`STALE`.
+    It states its language, by which screen readers pronounce, and when it is stale.
     """
     from nicegui import ui  # noqa: PLC0415
 
     about = f"lang = {language!r}; root.dataset.staleWords = {json.dumps(WORDS[language].stale)}"
     ui.add_head_html(f"<script>{{const root = document.documentElement; root.{about}}}</script>")
-    ui.add_css(STALE.with_suffix(".css"))
-    for script in (STALE, *scripts):
-        ui.add_head_html(f"<script>{script.read_text(encoding='utf-8')}</script>")
+    ui.add_css(HERE / "stale.css")
+    for name in ("stale", *scripts):
+        script = (HERE / name).with_suffix(".js").read_text(encoding="utf-8")
+        ui.add_head_html(f"<script>{script}</script>")
     ui.timer(BEAT_S, lambda: ui.run_javascript("labcraneBeat()"))
 
 

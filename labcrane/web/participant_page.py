@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from labcrane.web.form import ConsentCard, Form
-from labcrane.web.page import DRAFTS, PageContext, prepare
+from labcrane.web.page import PageContext, prepare
 from labcrane.web.panels import Reports
 from labcrane.web.server.access import PARTICIPANT
 
@@ -18,7 +18,7 @@ def participant_page(context: PageContext) -> None:
     ui.page_title(context.study.protocol.title or "labcrane")
     ui.colors(primary=page.colour)
     ui.add_css(STYLE)
-    prepare(page.language, DRAFTS)
+    prepare(page.language, "drafts")
     with ui.column().classes("form-page w-full max-w-4xl mx-auto p-4 gap-4"):
         if page.logo is not None:
             logo = ui.element("img").classes("form-logo")

@@ -13,52 +13,31 @@ PEOPLE = {"examiner", "stop rule"}
 
 ITEM = re.compile(r"([-*+•]|\d+[.)])\s")
 
+LANGUAGES = ("en", "de", "pl")
+TABLE = (
+    ("block", "Block", "Block", "Blok"),
+    ("trial", "Trial", "Durchgang", "Próba"),
+    ("distance", "Distance", "Abstand", "Odległość"),
+    ("time", "Time", "Zeit", "Czas"),
+    ("speed", "Tip speed", "Tempo der Spitze", "Prędkość końcówki"),
+    ("load", "Load", "Last", "Obciążenie"),
+    ("lateness", "Late", "Verspätung", "Opóźnienie"),
+    ("paused", "PAUSED", "PAUSE", "PAUZA"),
+    ("fault", "FAULT", "STÖRUNG", "AWARIA"),
+    ("wait", "WAIT", "WARTEN", "CZEKAJ"),
+    ("done", "DONE", "FERTIG", "KONIEC"),
+    ("practice", "practice", "Übung", "trening"),
+    (
+        "questions",
+        "Please answer the questions now:",
+        "Bitte jetzt die Fragen beantworten:",
+        "Proszę teraz odpowiedzieć na pytania:",
+    ),
+)
+"""A word or sentence a row: its name, and how it is in each of the languages."""
+
 WORDS: Mapping[str, Mapping[str, str]] = {
-    "en": {
-        "block": "Block",
-        "trial": "Trial",
-        "distance": "Distance",
-        "time": "Time",
-        "speed": "Tip speed",
-        "load": "Load",
-        "lateness": "Late",
-        "paused": "PAUSED",
-        "fault": "FAULT",
-        "wait": "WAIT",
-        "done": "DONE",
-        "practice": "practice",
-        "questions": "Please answer the questions now:",
-    },
-    "de": {
-        "block": "Block",
-        "trial": "Durchgang",
-        "distance": "Abstand",
-        "time": "Zeit",
-        "speed": "Tempo der Spitze",
-        "load": "Last",
-        "lateness": "Verspätung",
-        "paused": "PAUSE",
-        "fault": "STÖRUNG",
-        "wait": "WARTEN",
-        "done": "FERTIG",
-        "practice": "Übung",
-        "questions": "Bitte jetzt die Fragen beantworten:",
-    },
-    "pl": {
-        "block": "Blok",
-        "trial": "Próba",
-        "distance": "Odległość",
-        "time": "Czas",
-        "speed": "Prędkość końcówki",
-        "load": "Obciążenie",
-        "lateness": "Opóźnienie",
-        "paused": "PAUZA",
-        "fault": "AWARIA",
-        "wait": "CZEKAJ",
-        "done": "KONIEC",
-        "practice": "trening",
-        "questions": "Proszę teraz odpowiedzieć na pytania:",
-    },
+    language: {row[0]: row[at] for row in TABLE} for at, language in enumerate(LANGUAGES, 1)
 }
 
 

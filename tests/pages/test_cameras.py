@@ -105,7 +105,7 @@ def test_the_supervisor_sees_cameras_and_torques(tmp_path: Path, browser: webdri
     with a_room(protocol, tmp_path / "data") as room:
         wait_for(lambda: room.process("pages"))
         browser.get(room.links()["supervisor"])
-        shown(browser, "stage", "ready to start")
+        shown(browser, "instructions", "Please wait.")
         depth, colour = (seen(browser, f"camera-watch-{name}") for name in ("depth", "free"))
         wait_for(lambda: "N m" in text(browser, "load-shoulder"), PATIENCE_S)
         torques = {name: text(browser, f"load-{name}") for name in ch8().names}

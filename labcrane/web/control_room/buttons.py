@@ -73,25 +73,22 @@ def buttons(view: SessionView) -> list[Button]:
     def why(order: Order) -> str:
         return ENDED if view.over else why_not(order, view.standing) or ""
 
-    start, pause, judged = why(Order.START), why(Order.PAUSE), why(Order.COMPLETION)
+    def button(order: Order, label: str, key: str, text: str = "", **more: Any) -> Button:
+        return Button(f"order-{order}{text}", order, text, label, key, why(order), **more)
+
+    start, pause = why(Order.START), why(Order.PAUSE)
+    skip = "Skip this trial, break or questionnaire? It is not repeated."
+    end = "End the session now? The recorded data are kept."
     return [
-        Button(
-            "order-start", Order.START, "", _start(view.standing), "Space", start, primary=not start
-        ),
-        Button(
-            "order-pause", Order.PAUSE, "", "Pause", "P", pause, primary=bool(start) and not pause
-        ),
-        Button("order-repeat", Order.REPEAT, "", "Repeat trial", "R", why(Order.REPEAT)),
-        Button("order-skip", Order.SKIP, "", "Skip", "S", why(Order.SKIP),
-               asks="Skip this trial, break or questionnaire? It is not repeated.", danger=True),
-        Button("order-override", Order.OVERRIDE, "", "Override end", "O", why(Order.OVERRIDE)),
-        Button("order-completion1", Order.COMPLETION, "1", "Completed", "C", judged),
-        Button("order-completion0", Order.COMPLETION, "0", "Not completed", "X", judged),
-        Button(
-            "order-end", Order.END, "", "End session", "E", why(Order.END),
-            asks="End the session now? The recorded data are kept.", danger=True,
-        ),
-    ]  # fmt: skip
+        button(Order.START, _start(view.standing), "Space", primary=not start),
+        button(Order.PAUSE, "Pause", "P", primary=bool(start) and not pause),
+        button(Order.REPEAT, "Repeat trial", "R"),
+        button(Order.SKIP, "Skip", "S", asks=skip, danger=True),
+        button(Order.OVERRIDE, "Override end", "O"),
+        button(Order.COMPLETION, "Completed", "C", "1"),
+        button(Order.COMPLETION, "Not completed", "X", "0"),
+        button(Order.END, "End session", "E", asks=end, danger=True),
+    ]
 
 
 def _start(standing: Standing) -> str:

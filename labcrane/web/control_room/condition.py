@@ -16,11 +16,22 @@ SILENT_S = 1.0
 FIRST_S = 2.0
 """How long after a trial's start the first frame may come: the page must find the stream."""
 
-STATES = (
-    "starting", "consent", "waiting", "running", "paused", "fault", "break", "fixation",
-    "questionnaire", "decision", "judgement", "between", "ended",
-)  # fmt: skip
-"""States of a session; the page has a colour and a heading for each."""
+STATES: Mapping[str, str] = {
+    "starting": "Getting ready",
+    "consent": "Waiting for consent",
+    "waiting": "Ready to start",
+    "running": "",
+    "paused": "Paused",
+    "fault": "Stopped by a fault",
+    "break": "Break",
+    "fixation": "Eye tracker check",
+    "questionnaire": "Questionnaire",
+    "decision": "A decision is needed",
+    "judgement": "Waiting for your judgement",
+    "between": "Between two steps",
+    "ended": "Ended",
+}
+"""States of a session with their large headings; that of a running trial is the trial's name."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from typing import Any
 
 from nicegui import events
 from nicegui.element import Element
+from nicegui.elements import echart  # noqa: F401 - brings ECharts, which a chart imports
 
 REMEMBERED = 200
 """Orders whose names are kept: one that was sent again, as its answer was lost, is given once."""
@@ -16,7 +17,7 @@ STYLE = Path(__file__).with_name("room.css")
 Give = Callable[[str, str], str]
 
 
-class Room(Element, component="room.js"):
+class Room(Element, component="room.js", esm={"labcrane-chart": "../chart"}):
     """Draws its snapshot, and passes on the experimenter's actions.
 
     Parameters

@@ -2,10 +2,15 @@
 // Everything it shows comes from `show`; what people write leaves by `order`, and a field is
 // emptied only when the server has taken its words: a message lost with a connection is sent again.
 
+import { axes, Chart, short } from "labcrane-chart";
+
 const AGAIN_MS = 2000;
+const GOES_TO = { N: "#note-field", H: "#hint-field", Q: ".room-form button, .room-form input", T: "#streams button",
+  V: "#faults [id^=again-]", G: "#faults [id^=without-]" };
 const TYPES_IN = new Set(["INPUT", "TEXTAREA", "SELECT"]);
 
 export default {
+  components: { Chart },
   template: `
 <div class="room" :class="{wall}" :data-state="s.state" :data-level="s.lamp.level">
   <div class="room-actions" role="toolbar" aria-label="Actions" v-show="s.state !== 'ended'">
@@ -117,17 +122,7 @@ export default {
           <label class="room-field">Measure <select id="measure" v-model="measure">
             <option v-for="m in s.measures" :key="m.name" :value="m.name">{{ m.label }}</option>
           </select></label>
-          <svg class="room-chart" viewBox="0 0 400 150" role="img" :aria-label="said">
-            <rect v-if="band" class="room-band" :x="40" :width="352" :y="band.top" :height="band.high"/>
-            <line v-if="band" class="room-median" x1="40" x2="392" :y1="band.median" :y2="band.median"/>
-            <line class="room-axis" x1="40" x2="40" y1="8" y2="132"/>
-            <line class="room-axis" x1="40" x2="392" y1="132" y2="132"/>
-            <text x="36" y="14" text-anchor="end">{{ top }}</text>
-            <text x="36" y="132" text-anchor="end">{{ bottom }}</text>
-            <circle v-for="(p, at) in dots" :key="at" :cx="p.x" :cy="p.y" :r="p.now ? 4.5 : 2.5"
-              :class="p.kind"/>
-            <text x="216" y="147" text-anchor="middle">trials, latest on the right</text>
-          </svg>
+          <Chart :option="measured" :label="said"/>
           <p class="room-faint" id="movements">{{ said }}</p>
         </template>
       </section>
@@ -174,9 +169,7 @@ export default {
         <p class="room-faint" id="facts">{{ s.facts }}</p>
         <p v-for="question in s.questions" :key="question.ident" :id="question.ident" class="room-question">{{ question.text }}</p>
         <p v-if="!s.late.length" class="room-faint">Waiting for frames from the session.</p>
-        <template v-else><svg class="room-chart small" viewBox="0 0 400 70" role="img"
-          :aria-label="s.lateText"><line class="room-limit" x1="0" x2="400" :y1="tick" :y2="tick"/>
-          <path class="room-late" :d="lateness"/></svg>
+        <template v-else><Chart :option="lateness" :label="s.lateText"/>
         <p class="room-faint" id="lateness">{{ s.lateText }}</p></template>
       </details>
     </div>
@@ -190,8 +183,8 @@ export default {
   </dialog>
   <dialog ref="keys" class="room-dialog" aria-labelledby="keys-title">
     <h2 id="keys-title">Keys</h2>
-    <dl class="room-keys"><template v-for="k in keys" :key="k.key">
-      <dt><kbd>{{ k.key }}</kbd></dt><dd>{{ k.does }}</dd></template></dl>
+    <dl class="room-keys"><template v-for="k in [...s.buttons, ...keys]" :key="k.key">
+      <dt><kbd>{{ k.key }}</kbd></dt><dd>{{ k.label ?? k.does }}</dd></template></dl>
     <p><button type="button" class="room-button primary" @click="$refs.keys.close()">Close</button></p>
   </dialog>
 </div>`,
@@ -216,48 +209,32 @@ export default {
         (!words || (e.text + e.raw).toLowerCase().includes(words)));
     },
     points() { return this.s.results[this.measure] ?? { mine: [], before: [], cohort: null }; },
-    range() {
-      const { mine, before, cohort } = this.points;
-      const all = [...mine, ...before, ...(cohort ? cohort.slice(0, 3) : [])];
-      if (!all.length) return [0, 1];
-      const low = Math.min(0, ...all), high = Math.max(...all);
-      return high > low ? [low, high * 1.05] : [low, low + 1];
-    },
-    top() { return this.short(this.range[1]); },
-    bottom() { return this.short(this.range[0]); },
-    dots() {
-      const { mine, before } = this.points;
-      const all = [...before.map((v) => [v, "before"]), ...mine.map((v) => [v, "mine"])].slice(-60);
-      const step = 344 / Math.max(1, all.length - 1);
-      return all.map(([v, kind], at) => ({
-        x: all.length > 1 ? 44 + at * step : 216, y: this.height(v), kind,
-        now: at === all.length - 1,
-      }));
-    },
-    band() {
-      const cohort = this.points.cohort;
-      if (!cohort) return null;
-      const [low, median, high] = cohort.map((v) => this.height(v));
-      return { top: high, high: Math.max(1, low - high), median };
+    measured() {
+      const { mine, before, cohort } = this.points, [low, median, high] = cohort ?? [];
+      const dots = (name, values, from, color) => ({ name, type: "scatter", symbolSize: 7, itemStyle: { color },
+        data: values.map((v, n) => [from + n + 1, v]) });
+      const others = cohort && {
+        markArea: { silent: true, itemStyle: { color: "var(--band)" }, data: [[{ yAxis: low }, { yAxis: high }]] },
+        markLine: { silent: true, symbol: "none", label: { show: false }, lineStyle: { color: "var(--mine)" }, data: [{ yAxis: median }] },
+      };
+      return { ...axes("trial, of all sessions", this.s.measures.find((m) => m.name === this.measure)?.label),
+        series: [{ ...dots("this session", mine, before.length, "var(--mine)"), ...others }, dots("earlier", before, 0, "var(--before)")] };
     },
     said() {
       const { mine, before, cohort } = this.points;
       const unit = this.s.measures.find((m) => m.name === this.measure)?.unit ?? "";
-      const newest = mine.length ? `latest ${this.short(mine.at(-1))} ${unit}` : "no movement yet";
+      const newest = mine.length ? `latest ${short(mine.at(-1))} ${unit}` : "no movement yet";
       const own = before.length ? ` · this participant earlier: ${before.length}` : "";
       const others = cohort
-        ? ` · cohort of ${cohort[3]}: median ${this.short(cohort[1])} ${unit}, interquartile range shaded`
+        ? ` · cohort of ${cohort[3]}: median ${short(cohort[1])} ${unit}, interquartile range shaded`
         : " · no cohort to compare with yet";
       return newest + own + others;
     },
-    most() { return Math.max(2 * this.s.tickMs, ...this.s.late.map((one) => one[1])); },
-    tick() { return 66 - 62 * (this.s.tickMs / this.most); },
     lateness() {
-      const y = (v) => (66 - 62 * (v / this.most)).toFixed(1);
-      const x = (at) => (at * 400 / Math.max(1, this.s.late.length - 1)).toFixed(1);
-      const up = this.s.late.map(([, high], at) => `${x(at)},${y(high)}`);
-      const down = this.s.late.map(([low], at) => `${x(at)},${y(low)}`).reverse();
-      return `M${[...up, ...down].join("L")}Z`;
+      const line = (name, of) => ({ name, type: "line", symbol: "none", emphasis: { disabled: true }, lineStyle: { color: "var(--fill)" },
+        data: this.s.late.map((band, at) => [(at - this.s.late.length) / 2, band[of]]) });
+      const tick = { silent: true, symbol: "none", lineStyle: { color: "var(--bad)" }, label: { show: false }, data: [{ yAxis: this.s.tickMs }] };
+      return { ...axes("s before now", "late, ms"), series: [{ ...line("worst", 1), markLine: tick }, line("median", 0)] };
     },
   },
   watch: {
@@ -312,15 +289,10 @@ export default {
       if (e.key === " " && pressable) return;
       const key = e.key === " " ? "Space" : e.key.toUpperCase();
       const b = this.s.buttons.find((one) => one.key.toUpperCase() === key.toUpperCase());
-      const at = { N: "note-field", H: "hint-field" }[key];
       if (b && this.s.state !== "ended") this.press(b);
       else if (key === "?") this.open("keys");
-      else if (at) document.getElementById(at)?.focus();
+      else if (GOES_TO[key]) document.querySelector(GOES_TO[key])?.focus();
       else if (key === "F") this.cues();
-      else if (key === "Q") document.querySelector(".room-form button, .room-form input")?.focus();
-      else if (key === "T") document.querySelector("#streams button")?.focus();
-      else if (key === "V") document.querySelector("#faults [id^=again-]")?.focus();
-      else if (key === "G") document.querySelector("#faults [id^=without-]")?.focus();
       else if (key === "D") this.theme();
       else if (key === "W") this.wall = !this.wall;
       else return;
@@ -332,9 +304,7 @@ export default {
       cues.open = true;
       cues.querySelector("input, select")?.focus();
     },
-    height(v) { const [low, high] = this.range; return 132 - 122 * (v - low) / (high - low); },
-    short(v) { return Number(v).toPrecision(3).replace(/\.?0+$/, ""); },
-    valued(c) { return typeof c.now === "number" ? `${this.short(c.now)} ${c.unit}`.trim() : String(c.now); },
+    valued(c) { return typeof c.now === "number" ? `${short(c.now)} ${c.unit}`.trim() : String(c.now); },
     trace(values) {
       const known = values.filter((v) => v !== null);
       if (known.length < 2) return "M0,12L90,12";

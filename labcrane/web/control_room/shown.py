@@ -4,35 +4,21 @@ import json
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from typing import Any, Protocol
 
 import numpy as np
 
 from labcrane.core.primitives import Shape, TargetFinder
 from labcrane.core.records import Frame, Run, SessionState
 from labcrane.core.roles import Cue
-from labcrane.core.settings import Settings
+from labcrane.protocol.components import ComponentSpec
 from labcrane.recording.frame_log import FrameRow, sizes
 from labcrane.recording.run_codec import read_run
-from labcrane.registry.offers import Offer
 from labcrane.streams.context import CONTEXT, situation_of
 from labcrane.streams.frames import frame_columns
 from labcrane.streams.newest import NewestSample
 
 PAUSE_S = 0.1
 LOOP = "loop"
-
-
-class DrawnCue(Protocol):
-    """What a cue is built from: a study's choice, or a recording's metadata."""
-
-    @property
-    def settings(self) -> Settings:
-        """Its settings as the protocol has them."""
-
-    @property
-    def offer(self) -> Offer[Any]:
-        """Who builds it."""
 
 
 class ShownShapes:
@@ -46,7 +32,7 @@ class ShownShapes:
         Why the newest that the session told could not be taken up; empty when it was.
     """
 
-    def __init__(self, cues: Mapping[str, DrawnCue]) -> None:
+    def __init__(self, cues: Mapping[str, ComponentSpec]) -> None:
         self.run: Run | None = None
         self.trouble = ""
         self._specs = cues

@@ -16,6 +16,7 @@ from labcrane.recording.pictures import LOG
 from labcrane.web.control_room.bars import groups
 from labcrane.web.control_room.buttons import about_failed, answers, buttons
 from labcrane.web.control_room.condition import (
+    STATES,
     ExpectedSession,
     handled,
     lamp_of,
@@ -29,22 +30,6 @@ from labcrane.web.page import PageContext
 
 NEWEST = 120
 """Events that are listed."""
-
-STATES: Mapping[str, str] = {
-    "starting": "Getting ready",
-    "consent": "Waiting for consent",
-    "waiting": "Ready to start",
-    "paused": "Paused",
-    "fault": "Stopped by a fault",
-    "break": "Break",
-    "fixation": "Eye tracker check",
-    "questionnaire": "Questionnaire",
-    "decision": "A decision is needed",
-    "judgement": "Waiting for your judgement",
-    "between": "Between two steps",
-    "ended": "Ended",
-}
-"""The large heading for each state; for a running trial it is the trial's name."""
 
 
 class Snapshot:
@@ -89,7 +74,7 @@ class Snapshot:
                 plan.group and f"group {plan.group}", self._practice(),
             ])),
             "state": state,
-            "now": self._running() if state == "running" else STATES.get(state, ""),
+            "now": self._running() if state == "running" else STATES[state],
             "instructions": session.instructions,
             "stage": session.text + holds,
             "steps": steps,

@@ -6,7 +6,6 @@ one that is drawn, and only while it is summed up.
 
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from threading import Lock
@@ -17,15 +16,14 @@ import numpy as np
 from labcrane.analysis.gaze_streams import unmeasured
 from labcrane.core.records import Event, Run, SessionState
 from labcrane.core.roles import Cue, Feedback
-from labcrane.core.settings import Settings
 from labcrane.core.signals import Layout, signals_of
 from labcrane.design.counts import TrialCounts
 from labcrane.errors import LabcraneError, RecordingError
 from labcrane.files.yaml import parse_yaml
 from labcrane.machines.links import link_boxes
 from labcrane.machines.machine import Machine
+from labcrane.protocol.components import ComponentSpec
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
-from labcrane.registry.offers import Offer
 from labcrane.registry.registry import Registry
 from labcrane.streams.context import situation_after
 from labcrane.types import FloatArray
@@ -65,14 +63,6 @@ BREAKS = {
     "feedback.lost": ("feedback.ready", "what"),
 }
 """Events that begin a pause or a loss: what ends it, and which of their data says whose it is."""
-
-
-@dataclass(frozen=True, slots=True)
-class RecordedCue:
-    """What draws a cue as it was recorded."""
-
-    offer: Offer[Cue]
-    settings: Settings
 
 
 class Film:
@@ -357,7 +347,7 @@ class Film:
         self._curves.move_to_end(key)
         return self._curves[key]
 
-    def cues(self, registry: Registry) -> tuple[dict[str, RecordedCue], list[str]]:
+    def cues(self, registry: Registry) -> tuple[dict[str, ComponentSpec], list[str]]:
         """Return what draws the recorded cues, and why some of them cannot be drawn."""
         found, lacking = {}, []
         for name, use, settings in self._recorded_cues():
@@ -365,7 +355,8 @@ class Film:
                 continue  # a sound, which no picture shows
             try:
                 offer = registry.find(Cue, use)
-                found[name] = RecordedCue(offer, offer.settings.model_validate(settings))
+                was = offer.settings.model_validate(settings)
+                found[name] = ComponentSpec(use, "", offer, was)
             except (LabcraneError, ValueError) as error:
                 lacking.append(f"cue {name!r} is not shown: {str(error).partition(chr(10))[0]}")
         return found, lacking

@@ -1,9 +1,12 @@
 // Viewer of a recorded session: a timeline, curves and events around a time that the page requests.
 // Whatever is asked is asked again until it is answered: a message is lost with its connection.
 
+import { axes, Chart, short } from "labcrane-chart";
+
 const STEP_MS = 60, AGAIN_MS = 2000, SOON_MS = 150;
 
 export default {
+  components: { Chart },
   template: `
 <div class="room view">
   <header class="view-head">
@@ -28,10 +31,10 @@ export default {
             :aria-label="'spectrogram of signal ' + (at + 1)" @click="into($event, chart)"></canvas>
             <span class="view-now" aria-hidden="true" :style="now(chart)"></span></div>
           <p class="room-faint" :id="'heard-' + at">{{ chart.heard }}</p></div>
-        <div v-if="chart.path" class="view-plot"><svg class="room-chart" viewBox="0 0 600 110" preserveAspectRatio="none" role="img"
-          :aria-label="'signal ' + (at + 1)" @click="into($event, chart)"><path class="room-late" :d="chart.path"/></svg>
-          <span class="view-now" aria-hidden="true" :style="now(chart)"></span></div>
-        <p v-if="chart.path" class="room-faint" :id="'range-' + at"><strong :id="'value-' + at">{{ reading(chart) }}</strong> now · {{ chart.said }}</p>
+        <div v-if="chart.option" class="view-plot" @wheel.prevent="zoom($event)">
+          <Chart :option="chart.option" :label="'signal ' + (at + 1)" group="curves" @go="go"/>
+          <span class="view-frame" aria-hidden="true"><span class="view-now" :style="now(chart)"></span></span></div>
+        <p v-if="chart.option" class="room-faint" :id="'range-' + at"><strong :id="'value-' + at">{{ reading(chart) }}</strong> now · {{ chart.said }}</p>
       </div>
     </section>
   </div>
@@ -45,7 +48,7 @@ export default {
       <label class="room-field">Second <input id="second" type="number" min="0" :max="about.length" step="any"
         :value="t.toFixed(2)" @change="go(Number($event.target.value))"></label>
       <label class="room-field">Shown <select id="span" v-model.number="span" @change="go(t); askAll()">
-        <option :value="0">all</option><option v-for="one in [600, 60, 20, 5]" :key="one" :value="one">{{ one }} s</option></select></label>
+        <option :value="0">all</option><option v-for="one in widths" :key="one" :value="one">{{ Number(one.toPrecision(3)) }} s</option></select></label>
       <strong id="clock">{{ clock(t) }} of {{ clock(about.length) }}</strong>
     </div>
     <input type="range" id="scrub" class="view-scrub" aria-label="Time in seconds" min="0" :max="about.length" step="0.01"
@@ -99,7 +102,7 @@ export default {
   props: { about: Object },
   data() {
     return { open: {}, next: {}, why: "", glance: { areas: [], trail: [], looked: "" }, extent: { width: 1, height: 1 }, lane: { names: [], begin: 0, end: 1 }, words: "", from: null, marks: this.about.marks, markSaid: this.about.markSaid, t: 0, speed: 1, span: 0, playing: false, find: "", came: 0, asked: 0,
-      charts: [0, 1, 2].map(() => ({ signal: "", path: "", said: "", as: "curve", heard: "", values: null, begin: 0, end: 1 })) };
+      charts: [0, 1, 2].map(() => ({ signal: "", option: null, said: "", as: "curve", heard: "", values: null, begin: 0, end: 1 })) };
   },
   computed: {
     begin() { return this.span ? Math.min(Math.max(0, this.t - this.span / 2), Math.max(0, this.about.length - this.span)) : 0; },
@@ -109,6 +112,13 @@ export default {
         x: this.place(one.from), width: Math.max(0.5, this.place(one.to) - this.place(one.from)),
         kind: !one.counted ? "approach" : one.outcome === "success" ? "success" : "other",
       }));
+    },
+    widths() { return [...new Set([600, 60, 20, 5, this.span || 5])].sort((one, other) => other - one); },
+    bands() { // behind the curves: trials, pauses, losses, and where no frame is
+      const band = (from, to, color) => [{ xAxis: from, itemStyle: { color, opacity: 0.2 } }, { xAxis: to }];
+      return [...this.about.trials.filter((one) => one.counted).map((one) => band(one.from, one.to, "var(--band)")),
+        ...this.about.gaps.map(([from, to]) => band(from, to, "#cc79a7")),
+        ...this.about.breaks.map((one) => band(one.from, one.to, one.kind === "lost" ? "#9b1c1c" : "#e69f00"))];
     },
     picture() { return `0 0 ${this.extent.width} ${this.extent.height}`; },
     areaNames() { return [...new Set(this.lane.names.filter(Boolean))].sort(); },
@@ -207,6 +217,11 @@ export default {
       const box = e.currentTarget.getBoundingClientRect();
       this.go(begin + (end - begin) * (e.clientX - box.left) / box.width);
     },
+    zoom({ deltaY }) { // about the time that is shown
+      const span = (this.span || this.about.length) * (deltaY < 0 ? 0.8 : 1.25);
+      this.span = span < this.about.length ? Math.max(1, span) : 0;
+      this.askSoon();
+    },
     mark() {
       if (!this.words.trim()) return;
       const other = this.from === null ? this.t : this.from;
@@ -233,9 +248,9 @@ export default {
     },
     ask(at) {
       const chart = this.charts[at];
-      if (chart.signal === "") { chart.path = ""; return; }
+      if (chart.signal === "") { chart.option = null; return; }
       const { stream, column } = this.about.signals[chart.signal];
-      if (chart.as === "spectrogram") chart.path = "";
+      if (chart.as === "spectrogram") chart.option = null;
       this.question(`chart ${at}`, { kind: chart.as, at, stream, column, begin: this.begin, end: this.end });
     },
     curve({ at, kind, begin, end }, found) {
@@ -263,26 +278,24 @@ export default {
       const { low, high, unit } = values;
       const n = Math.min(low.length - 1, Math.floor(low.length * (this.t - begin) / Math.max(1e-9, end - begin)));
       if (n < 0 || low[n] === null || low[n] === undefined) return "no value";
-      const [least, most] = [low[n].toPrecision(4), high[n].toPrecision(4)];
+      const [least, most] = [short(low[n]), short(high[n])];
       return `${least === most ? least : `${least} to ${most}`}${unit === "1" ? "" : ` ${unit}`}`;
     },
     drawn(at, { low, high, unit }) {
-      this.charts[at].values = { low, high, unit };
-      const known = [...low, ...high].filter((v) => v !== null);
-      const chart = this.charts[at];
-      if (!known.length) { chart.path = "M0,55"; chart.said = "no value here"; return; }
-      const least = Math.min(...known), most = Math.max(...known), range = most - least || 1;
-      const y = (v) => (105 - 100 * (v - least) / range).toFixed(1), x = (n) => n * 600 / (low.length - 1);
-      let path = "", run = [];
-      const close = () => {
-        if (run.length) path += "M" + run.map((n) => `${x(n)},${y(high[n])}`).join("L") + "L" +
-          run.slice().reverse().map((n) => `${x(n)},${y(low[n])}`).join("L") + "Z";
-        run = [];
-      };
-      low.forEach((v, n) => { if (v === null) { if (n - (run.at(-1) ?? n) > 2) close(); } else run.push(n); });
-      close();
-      chart.path = path;
-      chart.said = `${least.toPrecision(4)} to ${most.toPrecision(4)} ${unit === "1" ? "" : unit}`;
+      const chart = this.charts[at], named = unit === "1" ? "" : unit;
+      chart.values = { low, high, unit };
+      const known = [...low, ...high].filter((v) => v !== null), data = [];
+      let last = Infinity;
+      low.forEach((v, n) => { // a step without a value is a gap once there are three in a row
+        if (v === null) return;
+        const t = chart.begin + (n + 0.5) * (chart.end - chart.begin) / low.length;
+        if (n - last > 3) data.push([t, null]);
+        data.push([t, v], [t, high[n]]);
+        last = n;
+      });
+      chart.option = { ...axes("s", named, { min: chart.begin, max: chart.end }), series: [{ data, type: "line", symbol: "none", emphasis: { disabled: true },
+        lineStyle: { color: "var(--fill)", width: 1.5 }, markArea: { silent: true, data: this.bands } }] };
+      chart.said = known.length ? `${short(Math.min(...known))} to ${short(Math.max(...known))} ${named}` : "no value here";
     },
     key(e) {
       if (e.ctrlKey || e.altKey || e.metaKey || ["INPUT", "SELECT", "BUTTON"].includes(e.target.tagName)) return;

@@ -8,7 +8,7 @@ from labcrane.errors import LabcraneError, RecordingError
 from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.registry.registry import Registry
 from labcrane.web.control_room.shown import ShownShapes
-from labcrane.web.page import PRIMARY, SEE_THROUGH, THEME, prepare
+from labcrane.web.page import PRIMARY, prepare
 from labcrane.web.scene import MachineScene, camera_buttons
 from labcrane.web.server.access import VIEWER
 from labcrane.web.server.serving import AWAY_S, build_pages, serve_here
@@ -53,7 +53,7 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
     """Build the page: one machine for each film, side by side at the same second."""
     from nicegui import ui  # noqa: PLC0415
 
-    from labcrane.web.control_room.element import STYLE  # noqa: PLC0415
+    from labcrane.web.control_room.element import STYLE  # noqa: PLC0415 - brings charts, too
     from labcrane.web.viewer.element import Timeline  # noqa: PLC0415
 
     first = films[0]
@@ -61,7 +61,7 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
     ui.colors(primary=PRIMARY)
     ui.add_css(STYLE)
     ui.add_css(HERE / "viewer.css")
-    prepare("en", THEME, SEE_THROUGH)
+    prepare("en", "theme", "see_through")
     screens, lacking = [], []
     for film in films:
         cues, why = film.cues(registry)
