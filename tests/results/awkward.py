@@ -1,16 +1,14 @@
 """An awkward cohort: unlike people, answers that a spreadsheet would take for formulas."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from governed import GOVERNED, Lab, Willing
+from governed import GOVERNED, Lab
 
 from labcrane.analysis.cohort import Status, find_cohort
 from labcrane.cli.app import main
-from labcrane.core.records import Event
-from labcrane.session.commands import Command, Order
 from labcrane.session.session import run
+from results.answering import Answering
 from results.undrawn import without_figures
 
 STUDY = (
@@ -66,32 +64,19 @@ HALF_FINISHED, ONCE = "P003", "P004"
 """Who ends the first session before its first trial is rated, and who misses the second."""
 
 
-class Answering(Willing):
-    """Answers what is asked; ends the session at the questionnaire ``leaves``."""
+class OneOfThem(Answering):
+    """Answers as one of them does: the workload is higher each time."""
 
     def __init__(self, participant: str, leaves: str = "") -> None:
-        super().__init__()
-        self._answers = ANSWERS[participant]
+        super().__init__({}, leaves)
+        self._own = ANSWERS[participant]
         self._load = 10 * int(participant[-1])
         self._asked: list[str] = []
-        self._leaves = leaves
-        self._waiting: list[Command] = []
 
-    def report(self, event: Event) -> None:
-        super().report(event)
-        if event.name != "questionnaire.start":
-            return
-        name = event.data["questionnaire"]
+    def given(self, name: str) -> Mapping[str, object]:
         self._asked.append(name)
-        load = dict.fromkeys(TLX, self._load * self._asked.count(name))
-        for item, value in (load | self._answers).items():
-            if item in ASKED[name]:
-                given = {"questionnaire": name, "item": item, "value": value}
-                self._waiting.append(Command(Order.ANSWER, json.dumps(given), "participant"))
-        self._waiting.append(Command(Order.END if name == self._leaves else Order.SUBMIT))
-
-    def commands(self) -> list[Command]:
-        return [*super().commands(), *([self._waiting.pop(0)] if self._waiting else [])]
+        every = dict.fromkeys(TLX, self._load * self._asked.count(name)) | self._own
+        return {item: value for item, value in every.items() if item in ASKED[name]}
 
 
 def awkward_lab(folder: Path) -> Lab:
@@ -103,9 +88,9 @@ def awkward_lab(folder: Path) -> Lab:
     for name in ANSWERS:
         lab.consent(name)
         leaves = "accuracy" if name == HALF_FINISHED else ""
-        run(lab.visit(name, fast=True), Answering(name, leaves))
+        run(lab.visit(name, fast=True), OneOfThem(name, leaves))
         if name not in {HALF_FINISHED, ONCE}:
-            run(lab.visit(name, 2, fast=True), Answering(name))
+            run(lab.visit(name, 2, fast=True), OneOfThem(name))
     return lab
 
 

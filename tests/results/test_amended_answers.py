@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from governed import GOVERNED, TODAY, Lab, Willing, edit
+from governed import GOVERNED, TODAY, Lab, edit
 from needs import needs
 from scipy.io import loadmat
 
 from labcrane.approval.decision import amend
 from labcrane.cli.app import main
-from labcrane.session.commands import Command, Order
 from labcrane.session.session import run
+from results.answering import Answering
 from results.consumers import bids_errors, needs_octave, octave, r
 from results.test_bids import validated
 
@@ -64,27 +64,12 @@ MOODS = {"mood-1": 4, "mood1": 8}
 FELT = {"P001": 4, "P002": "warm", "P003": "cold"}
 
 
-class Answering(Willing):
-    """Answers every item that is asked."""
-
-    def __init__(self, felt: object) -> None:
-        super().__init__()
-        self._felt = felt
-        self._waiting: list[Command] = []
-
-    def report(self, event) -> None:
-        super().report(event)
-        if event.name != "questionnaire.start":
-            return
-        name = event.data["questionnaire"]
-        for item in ITEMS[name]:
-            value = (GIVEN | {"felt": self._felt, "mood": MOODS.get(name)})[item]
-            given = {"questionnaire": name, "item": item, "value": value}
-            self._waiting.append(Command(Order.ANSWER, json.dumps(given), "participant"))
-        self._waiting.append(Command(Order.SUBMIT))
-
-    def commands(self) -> list[Command]:
-        return [*super().commands(), *([self._waiting.pop(0)] if self._waiting else [])]
+def answers(felt: object) -> dict[str, dict[str, object]]:
+    """Return an answer to every item that is asked."""
+    return {
+        name: {item: (GIVEN | {"felt": felt, "mood": MOODS.get(name)})[item] for item in items}
+        for name, items in ITEMS.items()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +83,7 @@ def exports(tmp_path_factory: pytest.TempPathFactory) -> Path:
             edit(lab.protocol, *ORDER)
             amend(lab.study, lab.registry, lab.grant(), "words are easier", TODAY)
         lab.consent(name)
-        run(lab.visit(name, fast=True), Answering(felt))
+        run(lab.visit(name, fast=True), Answering(answers(felt)))
     for to in ("tables", "psychds", "matlab", "bids"):
         out = str(lab.folder / "exports" / to)
         assert main(["export", str(lab.places.root), "--to", to, "--out", out]) == 0

@@ -194,25 +194,3 @@ def test_learning_has_two_time_scales(report: Path, movements: pd.DataFrame) -> 
     kept = found[("2 retention", "net gain")]
     if decrement.n == gain.n == kept.n:
         assert decrement.mean + gain.mean == pytest.approx(kept.mean, rel=1e-9)
-
-
-def test_results_stand_in_words_with_their_numbers_in_three_formats(report: Path) -> None:
-    row = told(report, "anova").set_index(["measure", "factor"])
-    row = row.loc[("movement_time", "sequence")]
-    df1, df2 = row["epsilon"] * row["df1"], row["epsilon"] * row["df2"]
-    numbers = f"({df1:.2f}, {df2:.2f}) = {row['f']:.2f}"
-    html, md, tex = (
-        (report / name).read_text() for name in ("report.html", "results.md", "results.tex")
-    )
-    assert f"over sequence, F{numbers}, p " in html
-    assert f"over sequence, *F*{numbers}, *p* " in md
-    assert f"over sequence, $F${numbers}, $p$ " in tex
-    assert r"$\eta_p^2$ = ." in tex
-    assert "NaN" not in md
-    assert "nan" not in md.replace("nant", "")
-
-
-def test_the_report_names_what_the_study_varies(report: Path) -> None:
-    page = (report / "report.html").read_text()
-    for word in ("none, slow", "retention", "nasa_tlx raw", "far_side", "Time-outs"):
-        assert word in page

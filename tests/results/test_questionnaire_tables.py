@@ -1,21 +1,20 @@
 """Answers and scores as tables, in every export, read by pandas, R and the BIDS validator."""
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from governed import GOVERNED, Lab, Willing
+from governed import GOVERNED, Lab
 from needs import needs
 
 from labcrane.analysis.cohort import Cohort, find_cohort
 from labcrane.analysis.questionnaires import answers_of, scores_of
 from labcrane.cli.app import main
 from labcrane.recording.participant_file.reader import open_recording
-from labcrane.session.commands import Command, Order
 from labcrane.session.session import run
+from results.answering import Answering
 from results.consumers import r
 
 STUDY = GOVERNED.replace(
@@ -38,28 +37,6 @@ sessions:""",
     "      - questionnaire: nasa_tlx",
 )
 TLX = {"mental": 10, "physical": 20, "temporal": 30, "performance": 40, "effort": 50}
-
-
-class Answering(Willing):
-    """Answers what is asked, item by item; ends the session where it is told to."""
-
-    def __init__(self, answers: Mapping[str, Mapping[str, object]], leaves: str = "") -> None:
-        super().__init__()
-        self._answers, self._leaves = answers, leaves
-        self._waiting: list[Command] = []
-
-    def report(self, event) -> None:
-        super().report(event)
-        if event.name != "questionnaire.start":
-            return
-        name = event.data["questionnaire"]
-        for item, value in self._answers.get(name, {}).items():
-            given = {"questionnaire": name, "item": item, "value": value}
-            self._waiting.append(Command(Order.ANSWER, json.dumps(given), "participant"))
-        self._waiting.append(Command(Order.END if name == self._leaves else Order.SUBMIT))
-
-    def commands(self) -> list[Command]:
-        return [*super().commands(), *([self._waiting.pop(0)] if self._waiting else [])]
 
 
 @pytest.fixture(scope="module")
