@@ -25,7 +25,7 @@ from labcrane.analysis.report.factors import (
     factors_of,
     with_factors,
 )
-from labcrane.analysis.statistics.anova import compare
+from labcrane.analysis.statistics.anova import compare, word
 from labcrane.analysis.statistics.mixed import NoModelError, mixed_model
 from labcrane.analysis.statistics.trends import linear_trend
 from labcrane.errors import ProtocolError
@@ -96,7 +96,7 @@ class PlannedTest:
     @cached_property
     def pair(self) -> tuple[str, str]:
         """The two levels of a contrast, as the report names them: the second less the first."""
-        one, other = map(outcomes.word, pair_of(self.effect, self.levels))
+        one, other = map(word, pair_of(self.effect, self.levels))
         return one, other
 
     @property
@@ -413,7 +413,7 @@ def _found(planned: PlannedTest, cohort: "pd.DataFrame", by: float | None) -> Re
     if planned.kind != "contrast":
         return ask(planned, cohort).moved(by)
     effect = planned.effect
-    own = cohort[column(effect.factor, planned.factors)].map(outcomes.word) == planned.pair[1]
+    own = cohort[column(effect.factor, planned.factors)].map(word) == planned.pair[1]
     return ask(planned, cohort.assign(**{effect.measure: cohort[effect.measure] + by * own}))
 
 

@@ -25,7 +25,6 @@ from labcrane.analysis.statistics.anova import (
     design,
     effects_in,
 )
-from labcrane.analysis.statistics.anova import word as word  # noqa: PLC0414 - of levels, here too
 from labcrane.analysis.statistics.confounding import told_apart
 from labcrane.analysis.statistics.time_scales import (
     FROM_BEFORE,
