@@ -122,46 +122,40 @@ def with_factors(movements: "pd.DataFrame") -> "pd.DataFrame":
         if name not in table:
             table[name] = usual
     counted = table["practice"].astype(float) == 0.0
-    table[PHASE] = _names(table, counted)
     _add_parts(table, counted)
     table[PLACE] = table.groupby(["participant", PHASE])["sequence"].rank(method="dense")
     return table
 
 
 def _add_parts(table: "pd.DataFrame", counted: "pd.Series[bool]") -> None:
-    """Add the session and the block of each movement by name and order; practice has none."""
+    """Add phase, session and block of each movement by name and order; practice has its own."""
     keys = table[counted].drop_duplicates(["session", "block"]).sort_values(["session", "block"])
     sessions = [own for _, own in keys.groupby("session")]
-    of_session: dict[tuple[float, float], str] = {}
-    of_block: dict[tuple[float, float], str] = {}
+    several = len(keys) > 1
+    parts: dict[tuple[float, float], tuple[str, str, str]] = {}
     for number, blocks in enumerate(sessions, start=1):
         for at, row in enumerate(blocks.to_dict("records"), start=1):
-            key = (row["session"], row["block"])
-            named = row["session_name"] or f"session {key[0]:g}"
-            of_session[key] = f"{number:0{len(str(len(sessions)))}} {named}"
-            of_block[key] = f"{at:0{len(str(len(blocks)))}} {row['block_name'] or 'block'}"
-    about = list(zip(table["session"], table["block"], counted, strict=True))
-    for name, parts in ((SESSION, of_session), (BLOCK, of_block)):
-        table[name] = [parts[(one, two)] if is_one else "practice" for one, two, is_one in about]
+            session, block = str(row["session_name"]), str(row["block_name"])
+            words = [session] if len(sessions) > 1 or not several else []
+            words += [block or f"block {row['block']:g}"] if len(blocks) > 1 else []
+            phase = ", ".join(filter(None, words)) or f"session {row['session']:g}"
+            parts[row["session"], row["block"]] = (
+                _numbered(len(parts) + 1, len(keys), phase) if several else phase,
+                _numbered(number, len(sessions), session or f"session {row['session']:g}"),
+                _numbered(at, len(blocks), block or "block"),
+            )
+    about = zip(table["session"], table["block"], counted, strict=True)
+    found = [
+        parts[session, block] if is_counted else (f"practice {block:g}", "practice", "practice")
+        for session, block, is_counted in about
+    ]
+    for at, name in enumerate((PHASE, SESSION, BLOCK)):
+        table[name] = [each[at] for each in found]
 
 
-def _names(table: "pd.DataFrame", counted: "pd.Series[bool]") -> list[str]:
-    """Return the name of each movement's phase; practice is its own."""
-    keys = table.loc[counted, ["session", "block"]].drop_duplicates()
-    keys = keys.sort_values(["session", "block"])
-    blocks = keys.groupby("session")["block"].size()
-    about = table.drop_duplicates(["session", "block"]).set_index(["session", "block"])
-    several, width = len(keys) > 1, len(str(len(keys)))
-    named: dict[tuple[object, object], str] = {}
-    for number, (session, block) in enumerate(keys.itertuples(index=False), start=1):
-        row = about.loc[(session, block)]
-        words = [str(row["session_name"])] if blocks.size > 1 or not several else []
-        if blocks[session] > 1:
-            words.append(str(row["block_name"]) or f"block {block:g}")
-        name = ", ".join(filter(None, words)) or f"session {session:g}"
-        named[(session, block)] = f"{number:0{width}} {name}" if several else name
-    pairs = zip(table["session"], table["block"], counted, strict=True)
-    return [named[(s, b)] if is_counted else f"practice {b:g}" for s, b, is_counted in pairs]
+def _numbered(number: int, of: int, name: str) -> str:
+    """Return ``02 retention``: names sort by their order."""
+    return f"{number:0{len(str(of))}} {name}"
 
 
 def factors_of(
