@@ -129,7 +129,7 @@ def guest(random):
     shown = frozenset({Fault.STEPPED, Fault.SLEWED, Fault.CONGESTED, Fault.FROZEN, Fault.LOST})
     return received(
         random, clock, times, 250.0, clean=False, chance=True,
-        perhaps=shown,
+        faults=frozenset({Fault.STRAYED}), perhaps=shown,
     )  # fmt: skip
 
 

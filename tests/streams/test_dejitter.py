@@ -7,7 +7,7 @@ from streams.synthetic import SourceClock, source
 from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.dejitter import Dejitter, even, left_open
 from labcrane.streams.sync.raw import RawStream
-from labcrane.streams.sync.stamping.holes import lost_before, lost_between
+from labcrane.streams.sync.stamping.late_chunks import lost_before, lost_between
 
 
 @pytest.fixture

@@ -83,6 +83,9 @@ PAUSE_S = 0.5
 BACK_S = 0.001
 """By more than this a sample is placed before one that came earlier."""
 
+NEARLY_ALL = 1.35
+"""Of what scatters by chance, 99 % are within so many times what 95 % are within."""
+
 STANDING = 20
 """So many stamps of markers that are all the same say nothing."""
 
@@ -251,25 +254,30 @@ def _examined(raw: RawStream, placed: Placement, treatment: Treatment) -> list[_
                 sampling = examine(*seen, probed=probed, pauses=pauses)
             else:
                 sampling = examine_irregular(*seen)
-            followed = _followed(times[part], sampling) if sampling.steady else None
-            found.append((segment, sampling, followed))
+            followed = None
+            if sampling.steady:
+                followed = _followed(times[part], sampling)
+                sampling = sampling.judged_by(times[part] - followed[0])
+            found.append((segment, sampling, followed if sampling.steady else None))
     return found
 
 
 def _followed(time: FloatArray, sampling: Sampling) -> _Followed:
-    """Return even times and their error.
+    """Return even times and their error; those that polls stamped lie on one straight line.
 
-    Those that waited for their receiver lie on one straight line: the phase of a poll that slides
-    along the samples is none of the sampler's.
+    A phase that slides along the grid of polls is none of the sampler's.
     """
-    if sampling.received is not None:
-        return even_line(time, sampling.index), np.full(len(time), sampling.received.strayed_s)
-    dejittered, doubt = time.copy(), np.full(len(time), sampling.noise_s)
-    for start, stop in itertools.pairwise((0, *sampling.breaks, len(time))):
-        if stop - start >= LONG_RUN:  # the length of a hole is not dejittered
-            part = slice(start, stop)
-            dejittered[part], doubt[part] = follow_sample_clock(time[part], sampling.index[part])
-    return dejittered, doubt
+    if sampling.received is None or not sampling.received.polled:
+        dejittered, doubt = time.copy(), np.full(len(time), sampling.noise_s)
+        for start, stop in itertools.pairwise((0, *sampling.breaks, len(time))):
+            if stop - start >= LONG_RUN:  # the length of a hole is not dejittered
+                part = slice(start, stop)
+                dejittered[part], doubt[part] = follow_sample_clock(
+                    time[part], sampling.index[part]
+                )
+        return dejittered, doubt
+    line = even_line(time, sampling.index)
+    return line, np.full(len(time), sampling.received.strayed_s)
 
 
 def _evened(
@@ -282,10 +290,12 @@ def _evened(
     for segment, sampling, followed in sampled:
         part = slice(segment.start, segment.stop)
         # Nothing tells cut stamps from rounded ones, and so whether they are half a unit early.
-        error[part] += sampling.grid_s / 2.0 + sampling.back_s
+        error[part] += sampling.grid_s / 2.0 + sampling.back_s + sampling.kept_s
         error[part] += sampling.unsure_s
         if not treatment.can_drop_samples:  # nothing else tells uneven samples from late stamps
-            error[part] += sampling.scatter_s
+            error[part] += NEARLY_ALL * sampling.uneven_s
+        if sampling.strayed is not None:
+            error[part] += sampling.strayed
         if sampling.shifted is not None:
             error[part] += sampling.shifted.open_s(segment.stop - segment.start)
         if way is Dejitter.AUTO and followed is not None and segment.basis is Basis.PROBES:
@@ -402,12 +412,14 @@ def _flow(placed: Placement, sampled: list[_Sampled], *, regular: bool) -> dict[
     """Return what the segments' sampling says together."""
     each = [sampling for _, sampling, _ in sampled]
     shifts = [one.shifted.by_s for one in each if one.shifted is not None]
+    strays = [one.strayed for one in each if one.strayed is not None]
     told = {
         "dropped": sum(one.missing for one in each),
         "uncounted": int(any(one.uncounted for one in each)),
         "disordered": sum(one.disordered for one in each),
         "stalls": sum(one.stalls for one in each),
         "longest_stall_s": max((one.longest_stall_s for one in each), default=0.0),
+        "strayed": sum(int(np.count_nonzero(one)) for one in strays),
         "shifts": sum(len(one) for one in shifts),
         "shift_s": max((float(np.abs(one).max()) for one in shifts if len(one)), default=0.0),
         "grid_s": max((one.grid_s for one in each), default=0.0),

@@ -139,24 +139,29 @@ def left_open(times: FloatArray, dejittered: FloatArray, way: Dejitter) -> Float
 
 
 def _follow(times: FloatArray, index: FloatArray, way: Dejitter) -> FloatArray:
-    """Return the times on lines that fade into each other, each of its stretch at its middle."""
+    """Return the times on lines that fade into each other."""
     fit = _envelope if way is Dejitter.ENVELOPE else _least_squares
-    count = int((times[-1] - times[0]) / (STRETCH_S / 2.0)) - 1
-    if count < 2:  # noqa: PLR2004
+    duration = times[-1] - times[0]
+    if duration < 1.5 * STRETCH_S:
         return fit(times, index)(index)
-    edges = np.linspace(0, len(times), count + 2).astype(int)
-    lines = [
-        fit(times[start:stop], index[start:stop])
-        for start, stop in zip(edges[:-2], edges[2:], strict=True)
-    ]
-    place = np.interp(np.arange(len(times)), edges[1:-1], np.arange(count))
-    first = np.minimum(place.astype(int), count - 2)
-    result = np.empty(len(times))
-    for k in range(count - 1):
-        here = first == k
-        share = place[here] - k
-        result[here] = (1.0 - share) * lines[k](index[here]) + share * lines[k + 1](index[here])
-    return result
+    count = round(duration / (STRETCH_S / 2)) - 1
+    half = (index[-1] - index[0]) / (count + 1)
+    total, result = np.zeros(len(times)), np.zeros(len(times))
+    for k in range(count):
+        centre = index[0] + (k + 1) * half
+        here = slice(*np.searchsorted(index, (centre - half, centre + half)))
+        near = index[here]
+        weight = np.clip(1.0 - np.abs(near - centre) / half, 1e-9, 1.0)
+        if k == 0:
+            weight[near < centre] = 1.0
+        if k == count - 1:
+            weight[near > centre] = 1.0
+            here = slice(here.start, len(times))
+            near = index[here]
+            weight = np.r_[weight, np.ones(len(near) - len(weight))]
+        result[here] += weight * fit(times[here], near)(near)
+        total[here] += weight
+    return result / total
 
 
 def _least_squares(times: FloatArray, index: FloatArray) -> Line:

@@ -16,6 +16,11 @@ from labcrane.types import FloatArray
 JUMP_S = 0.002
 """Offsets that differ by more than this, and more than probes can err, are two clocks."""
 
+SMALL_S = 0.0003
+WALK = 1e-4
+ALONE = 0.3
+"""Or by these, if the offset goes on before and after as if nothing had been."""
+
 FASTEST_DRIFT = 500e-6
 """No crystal in a computer drifts faster, in seconds per second."""
 
@@ -128,7 +133,21 @@ def _jumps(probes: FloatArray) -> list[int]:
     change = np.diff(probes[:, OFFSET])
     far = np.abs(change) > JUMP_S + drift + doubt
     far &= ~_slewed(change, np.abs(np.diff(measured)), doubt)
+    far |= _alone(change, np.abs(np.diff(measured)), probes[:, RTT])
     return [int(k) + 1 for k in np.flatnonzero(far)]
+
+
+def _alone(change: FloatArray, step: FloatArray, trips: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return which changes stand alone: small steps, which no clock drifts or is slewed by."""
+    if len(change) < 3:  # noqa: PLR2004
+        return np.zeros(len(change), dtype=np.bool_)
+    usual = float(np.median(change / np.maximum(step, 1e-3)))
+    beyond = np.abs(change - usual * step)
+    excess = trips - trips.min()
+    near = np.pad(beyond, 1)
+    around = np.maximum(near[:-2], near[2:])
+    clear = beyond > SMALL_S + WALK * step + (excess[1:] + excess[:-1]) / 2.0
+    return np.asarray(clear & (around < ALONE * beyond), dtype=np.bool_)
 
 
 def _slewed(change: FloatArray, step: FloatArray, doubt: FloatArray) -> npt.NDArray[np.bool_]:

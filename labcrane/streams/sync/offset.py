@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labcrane.streams.sync.clock_curve import Smoothed
 from labcrane.streams.sync.raw import OFFSET, REMOTE, RTT
-from labcrane.streams.sync.smoother import Smoothed, smooth
+from labcrane.streams.sync.smoother import smooth
 from labcrane.streams.sync.steady_sampler import SteadySampler
 from labcrane.types import FloatArray
 

@@ -91,6 +91,8 @@ class Quality:
         1 where chunks are stamped when they are sent.
     shifts, shift_s
         How often stamps are later, or sooner, from one sample on, by the largest shift.
+    strayed
+        Samples that are stamped beside their even count for a while.
     moved_p95_s, moved_max_s
         By how much evening moved samples.
     steps, restarts, sleeps, slews
@@ -145,6 +147,7 @@ class Quality:
     late_stamps: int = 0
     shifts: int = 0
     shift_s: float = 0.0
+    strayed: int = 0
     moved_p95_s: float = 0.0
     moved_max_s: float = 0.0
     steps: int = 0

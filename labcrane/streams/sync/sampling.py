@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
-from numpy.lib.stride_tricks import sliding_window_view
 
-from labcrane.streams.sync.stamping import holes, levels, receipt, shifts, units
+from labcrane.streams.sync.stamping import holes, levels, receipt, shifts, strays, units
+from labcrane.streams.sync.stamping.late_chunks import lost_before, lost_between, slope, soonest
 from labcrane.types import FloatArray
 
 FEW = 20
@@ -18,12 +18,6 @@ BLOCKS = 200
 MANY, SPAN = 400, 150
 CLUMPED = 0.5
 """Where the usual step is less than this part of the period, samples are stamped in bursts."""
-
-NEARLY_ALL = 1.35
-"""Of what scatters by chance, 99 % are within so many times what 95 % are within."""
-
-AROUND = 4
-"""The level of most of so many blocks before and after is that of a steady clock."""
 
 BURST = 1.0 / 3.0
 """No sampler goes faster for a while by more: what seems to is sent behind a stall."""
@@ -41,6 +35,7 @@ SAME = 0.5
 EARLIER = 0.1
 """At least this part of chunks stamped when sent waited for less than the one before."""
 
+DELAYS = 0.25
 RATE_CHANGE = 1e-3
 PIECES = 8
 """So many pieces at least tell a changing rate."""
@@ -48,6 +43,9 @@ PIECES = 8
 LEAST_NOISE_S = 5e-5
 WITHIN = 0.75
 """Stamps on a grid scatter by half of its unit; what scatters by more was not taken evenly."""
+
+FEW_CHUNKS = 3
+"""In so many samples, or chunks, stamps that scatter by chance show how far they do."""
 
 BEHIND_S = 1e-6
 """An irregular sample is out of order when it is stamped by more than this before another."""
@@ -78,6 +76,8 @@ class Sampling:
         so, or scatter as their grid lets them.
     grid_s
         Unit that stamps are cut or rounded to; 0 where they are not.
+    reach_s
+        By how much a few neighbouring samples, or chunks, differ from evenly spaced ones.
     late_stamps
         Whether whole chunks are stamped when they are sent: an unknown delay lies in all of them.
     steady
@@ -98,14 +98,16 @@ class Sampling:
     uneven_s
         By how much stamps scatter about a steady clock, at 95 %, that are taken to be right: as
         samples of an uneven sampler are, and those which are late by delays to both sides alike.
-    scatter_s
-        How far each sample is stamped beside a steady clock, shape ``(n,)``, at least what nearly
-        all are: it was taken so, or stamped so, and nothing tells.
+    strayed
+        By how much each sample is stamped beside its count for a while, shape ``(n,)``; None where
+        none is.
     breaks
         The samples behind holes of which nothing shows how many periods they are.
     unsure_s
         By how much samples near a loss may be off, shape ``(n,)``: which of them came before it is
         not known.
+    kept_s
+        Scatter of timestamps, as arrivals show, that could not be dejittered.
     back_s
         By how much the clock of an irregular stream without arrivals may have been set back.
     behind
@@ -120,6 +122,7 @@ class Sampling:
     rates_hz: tuple[float, ...] = ()
     noise_s: float = 0.0
     grid_s: float = 0.0
+    reach_s: float = 0.0
     late_stamps: bool = False
     steady: bool = False
     uncounted: bool = False
@@ -130,16 +133,40 @@ class Sampling:
     longest_stall_s: float = 0.0
     index: FloatArray = field(default_factory=lambda: np.empty(0))
     uneven_s: float = 0.0
-    scatter_s: FloatArray | float = 0.0
+    strayed: FloatArray | None = None
     breaks: npt.NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     unsure_s: FloatArray | float = 0.0
     back_s: float = 0.0
+    kept_s: float = 0.0
     behind: int = 0
 
     @property
     def rate_hz(self) -> float:
         """Samples per second, while they flowed."""
         return 1.0 / self.period
+
+    def judged_by(self, moved: FloatArray) -> "Sampling":
+        """Return it as steady only if evening moved samples as far as stamping noise scatters.
+
+        Noise is new in each stamp, so that a few neighbours show all of it. What adds up beyond
+        that is the sampler's own, as of a camera that takes longer in the dark. What arrivals show
+        to be noise stays noise, as far as neighbours show it, though nothing takes it away.
+
+        Parameters
+        ----------
+        moved
+            By how much, in seconds, shape ``(n,)``.
+        """
+        if self.received is not None:
+            return self
+        by_grid = self.grid_s > 0.0 and not self.noise_s
+        allowed = WITHIN * self.grid_s if by_grid else self.reach_s
+        if float(np.quantile(np.abs(moved), 0.95)) <= allowed:
+            return self
+        kept = 0.0 if self.late_stamps else min(self.noise_s, self.reach_s)
+        return replace(
+            self, noise_s=0.0, kept_s=kept, late_stamps=False, steady=False, unplaced=False
+        )
 
 
 def examine(
@@ -168,39 +195,58 @@ def examine(
     pauses
         Whether the sampler is declared to pause.
     """
-    counted = counter is not None
     index = np.arange(len(time), dtype=np.float64) if counter is None else counter
     stalls, longest = _stalls(time, arrival)
-    told = Sampling(index=index, stalls=stalls, longest_stall_s=longest)
     if len(time) < FEW:
-        return told
-    order, disordered = np.arange(len(time)), 0
-    if _is_shuffled(np.diff(time)):
-        order = np.argsort(time, kind="stable")
-        disordered = int(np.count_nonzero(np.diff(np.maximum.accumulate(time)) == 0.0))
+        return Sampling(index=index, stalls=stalls, longest_stall_s=longest)
+    order = np.argsort(time, kind="stable")
+    behind = int(np.count_nonzero(np.diff(np.maximum.accumulate(time)) == 0.0))
+    sorted_steps = np.diff(time[order])
+    disordered = behind if _is_shuffled(np.diff(time), sorted_steps) else 0
     grid = coarse_unit(stamps, regular=True)
-    # Who has no counter counts as they stand.
-    found = _steps(time[order], index[order] if counted else index, grid, counted=counted)
-    shifted = found.shifted.without_pauses() if pauses else found.shifted
-    grid = 0.0 if _on_grid(found, np.sort(stamps) if disordered else stamps, grid) else grid
-    level, uncounted = None, False
-    explained = found.computed and not found.missing and not found.clumped
-    exact_shift = found.exact and len(shifted.at) > 0
-    if probed and not (disordered or grid or exact_shift or explained):
-        if not counted and (found.clumped or not (found.exact or found.computed)):
-            level = (levels.of_packets if found.clumped else levels.find)(time, found.period)
-            uncounted = level is None
-        told = replace(told, uncounted=uncounted)
-        waited = _received(told, time, level)
+    if disordered:
+        counts = index if counter is None else counter[order]  # who has none counts as they stand
+        found = _steps(time[order], counts, grid, counted=counter is not None)
+    else:
+        found = _steps(time, index, grid, counted=counter is not None)
+    if pauses:
+        found = replace(found, shifted=found.shifted.without_pauses())
+    grid = 0.0 if _on_grid(found, stamps[order], grid) else grid
+    shifted = found.exact and len(found.shifted.at) > 0
+    level, blurred = None, False
+    if probed and not disordered and not grid and not shifted:
+        explained = found.computed and not found.missing and not found.clumped
+        blurred = counter is None and (found.clumped or not (found.exact or found.computed))
+        if blurred:
+            find = levels.of_packets if found.clumped else levels.find
+            level = find(time, found.period)
+        sure = slice(None)
+        if level is not None:
+            index, sure = index + level.lost, level.unsure == 0.0
+        waited = receipt.find(time[sure], index[sure], explained=explained)
         if waited is not None:
-            return waited
+            longer = np.diff(index) > 1.5  # noqa: PLR2004
+            return Sampling(
+                waited.period,
+                missing=int((np.diff(index)[longer] - 1.0).sum()),
+                gaps=int(np.count_nonzero(longer)),
+                longest_gap_s=float(np.diff(time)[longer].max(initial=0.0)),
+                noise_s=waited.spread_s,
+                late_stamps=True,
+                steady=True,
+                received=waited,
+                stalls=stalls,
+                longest_stall_s=longest,
+                index=index,
+                unsure_s=0.0 if level is None else level.unsure * waited.period,
+                uncounted=blurred and level is None,
+            )
+    noise, late, by_grid, uneven = _noise(time, arrival, found, grid)
     rates = _rates(found)
-    noise, late, by_grid, uneven, scatter = _noise(
-        time, None if disordered else arrival, found, grid
-    )
-    return replace(
-        told,
-        period=found.period,
+    steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
+    unplaced = late and counter is None and (found.clumped or found.missing > 0)
+    return Sampling(
+        found.period,
         missing=found.missing if level is None else int(level.lost[-1]),
         gaps=found.gaps,
         longest_gap_s=found.longest,
@@ -208,38 +254,18 @@ def examine(
         rates_hz=rates,
         noise_s=noise,
         grid_s=grid,
+        reach_s=_reach(found),
         late_stamps=late,
-        steady=(noise > LEAST_NOISE_S or by_grid) and not disordered and not rates,
-        unplaced=late and not counted and (found.clumped or found.missing > 0),
-        shifted=shifted,
+        steady=steady,
+        uncounted=blurred and level is None,
+        unplaced=unplaced,
+        shifted=found.shifted,
+        stalls=stalls,
+        longest_stall_s=longest,
         index=index if disordered else found.index,
         uneven_s=uneven,
-        scatter_s=uneven if rates else scatter,
+        strayed=None if disordered or rates else found.strayed,
         breaks=found.breaks,
-    )
-
-
-def _received(told: Sampling, time: FloatArray, level: levels.Levels | None) -> Sampling | None:
-    """Return a stream as one whose samples waited; None where nothing shows that they did."""
-    index, unsure = told.index, np.zeros(len(time))
-    if level is not None:
-        index, unsure = index + level.lost, level.unsure
-    waited = receipt.find(time[unsure == 0.0], index[unsure == 0.0])
-    if waited is None:
-        return None
-    longer = np.diff(index) > 1.5  # noqa: PLR2004
-    return replace(
-        told,
-        period=waited.period,
-        missing=int((np.diff(index)[longer] - 1.0).sum()),
-        gaps=int(np.count_nonzero(longer)),
-        longest_gap_s=float(np.diff(time)[longer].max(initial=0.0)),
-        noise_s=waited.spread_s,
-        late_stamps=True,
-        steady=True,
-        received=waited,
-        index=index,
-        unsure_s=unsure * waited.period,
     )
 
 
@@ -305,7 +331,9 @@ class _Steps:
     exact: bool
     computed: bool
     clumped: bool
+    balance: float
     shifted: shifts.Shifts
+    strayed: FloatArray | None
 
 
 def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -> _Steps:
@@ -320,7 +348,7 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
     scatter = 1.4826 * float(np.median(np.abs(rest)))
     odd = float((np.abs(rest) > WHOLE * local).mean())
     exact = scatter < EXACT * float(np.median(local)) and odd < 0.01  # noqa: PLR2004
-    same, in_chunks = _chunks(steps, counts * local)
+    same, balance, in_chunks = _chunks(steps, counts * local)
     # Steps are computed by one rate, whatever the clock that stamps the chunks does meanwhile.
     one_rate = bool(np.ptp(np.quantile(local, (0.1, 0.9))) < RATE_CHANGE * typical)
     computed = clumped or (not grid and in_chunks and one_rate)
@@ -345,36 +373,44 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
     missing = int((whole - 1.0).sum())
     position = index if counted else index[0] + np.r_[0.0, np.cumsum(whole)]
     flowed = time - np.r_[0.0, np.cumsum(beyond - back)]
-    mean, usual = holes.slope(position, flowed), float(np.median(local))
+    mean, usual = slope(position, flowed), float(np.median(local))
     if computed and not clumped and not counted:
         first = np.r_[0, np.flatnonzero(~same) + 1]
         rest = time[first] - usual * position[first]
-        lost, mean = holes.lost_between(position[first], rest, usual)
+        lost, mean = lost_between(position[first], rest, usual)
         if lost:
-            before = holes.lost_before(rest, usual)
+            before = lost_before(rest, usual)
             position = position + np.repeat(before, np.diff(np.r_[first, len(time)]))
             missing += max(int(before[-1]), 1)
     longest = float(steps[gaps].max(initial=0.0))
+    strayed = None
+    # A long hole may be off by a part of a period, and what is behind it seem to stray.
+    if exact and not grid and not len(breaks) and float(whole.max()) < strays.LONG_HOLE:
+        strayed = strays.find(flowed, position, usual, scatter)
+    if strayed is not None:
+        mean = slope(position[strayed == 0.0], flowed[strayed == 0.0])
     return _Steps(
         time, flowed, breaks + 1, mean, local, position, missing, int(gaps.sum()), longest, exact,
-        computed, clumped, shifted,
+        computed, clumped, balance, shifted, strayed,
     )  # fmt: skip
 
 
-def _chunks(steps: FloatArray, usual: FloatArray) -> tuple[npt.NDArray[np.bool_], bool]:
-    """Return which steps are usual ones, and whether the others part chunks.
+def _chunks(steps: FloatArray, usual: FloatArray) -> tuple[npt.NDArray[np.bool_], float, bool]:
+    """Return which steps are usual ones, how far others add up, and whether these part chunks.
 
     Steps of chunks stamped when sent differ by their delays, which do not add up.
     """
     same = np.abs(steps - usual) < EQUAL_S
     boundary = (steps - usual)[~same]
+    moved = float(np.abs(boundary).sum())
+    balance = abs(float(boundary.sum())) / moved if moved > 0.0 else 0.0
     between = boundary / usual[~same]
     fraction = np.abs(between - np.round(between)) > 0.05 if len(between) else np.zeros(0, bool)  # noqa: PLR2004
     repeated = same.mean() > SAME and len(boundary) >= FEW and fraction.mean() > 0.5  # noqa: PLR2004
     # A chunk that waits for longer than the one before comes late, the next one early.
     early = boundary < -EQUAL_S
     both_ways = len(early) > 0 and float(early.mean()) > EARLIER
-    return same, bool(repeated and both_ways)
+    return same, balance, bool(repeated and both_ways)
 
 
 def _typical(time: FloatArray, index: FloatArray) -> float:
@@ -404,25 +440,28 @@ def _local(steps: FloatArray) -> FloatArray:
     return np.asarray(np.interp(np.arange(len(steps)), middle, usual))
 
 
-def _is_shuffled(steps: FloatArray) -> bool:
+def _is_shuffled(steps: FloatArray, in_order: FloatArray) -> bool:
     """Whether samples fall in place when they are put in the order of their stamps."""
     if not (steps < 0.0).any():
         return False
-    in_order = np.diff(np.sort(np.r_[0.0, np.cumsum(steps)]))
     usual = float(np.median(in_order))
     odd, left = (
-        np.count_nonzero(np.abs(each - usual) > WHOLE * usual) for each in (steps, in_order)
+        int(np.count_nonzero(np.abs(each - usual) > WHOLE * usual)) for each in (steps, in_order)
     )
-    return bool(left < 0.5 * odd)
+    return left < 0.5 * odd
 
 
 def _rates(found: _Steps) -> tuple[float, ...]:
     """Return the rates at first and at last where they differ by more than stamps scatter."""
-    if found.computed:
-        return ()
     edges = np.linspace(0, len(found.time) - 1, 41).astype(int)
+    if found.strayed is not None:
+        own = np.flatnonzero(found.strayed == 0.0)
+        edges = np.unique(own[np.minimum(np.searchsorted(own, edges), len(own) - 1)])
+    blurred = 0.0
+    if found.computed:
+        edges, blurred = soonest(found.flowed, found.period, found.index)
     span = np.diff(found.index[edges])
-    if len(span) < PIECES or (span <= 0).any():
+    if len(span) < PIECES or (span <= 0).any() or (found.computed and found.balance >= DELAYS):
         return ()
     if not (np.diff(found.flowed[edges]) > 0.0).all():  # stamps stood still, or went back
         return ()
@@ -431,7 +470,8 @@ def _rates(found: _Steps) -> tuple[float, ...]:
     ends = [float(np.median(part)) for part in (rate[:4], rate[-4:])]
     mean = float(np.median(rate))
     low, high = np.quantile(rate, (0.05, 0.95))
-    if high - low < max(RATE_CHANGE * mean, 8.0 * scatter):
+    blurred *= mean / float(np.diff(found.flowed[edges]).min())
+    if high - low < max(RATE_CHANGE * mean, 8.0 * scatter, blurred):
         return ()
     if found.exact or abs(ends[1] - ends[0]) > RATE_CHANGE * mean:
         return 1.0 / ends[0], 1.0 / ends[1]
@@ -440,12 +480,11 @@ def _rates(found: _Steps) -> tuple[float, ...]:
 
 def _noise(
     time: FloatArray, arrival: FloatArray | None, found: _Steps, grid: float
-) -> tuple[float, bool, bool, float, FloatArray | float]:
+) -> tuple[float, bool, bool, float]:
     """Return by how much the stamps scatter that were not taken so, and why.
 
     The second is whether they are late, the third whether only their grid lets them scatter, the
-    fourth by how much those scatter that were taken so, for all that is known, and the last how far
-    each of them is beside a steady clock.
+    last by how much those scatter that were taken so, for all that is known.
 
     Stamps that are computed, of a coarse clock, or unlike the arrivals of their samples were not
     taken when the samples were.
@@ -457,8 +496,7 @@ def _noise(
     count = max(len(rest) // size, 1)
     blocks = np.array_split(rest, count)
     middle = np.cumsum([len(block) for block in blocks]) - len(blocks[0]) / 2
-    usual = np.array([float(np.median(block)) for block in blocks])
-    level = np.interp(np.arange(len(rest)), middle, usual)
+    level = np.interp(np.arange(len(rest)), middle, [float(np.median(block)) for block in blocks])
     apart = np.abs(rest - level)
     spread = float(np.quantile(apart, 0.95))
     if found.computed:
@@ -467,25 +505,35 @@ def _noise(
             True,
             False,
             0.0,
-            0.0,
         )
     if grid and spread <= WITHIN * grid:
-        return 0.0, False, True, 0.0, 0.0
-    least = max(LEAST_NOISE_S, 0.005 * found.period)
-    if min(spread, 3.0 * float(np.median(apart))) < least:  # but for some
-        around = np.pad(usual, AROUND, "reflect", reflect_type="odd")
-        usual = np.median(sliding_window_view(around, 2 * AROUND + 1), axis=1)
-        apart = np.abs(rest - np.interp(np.arange(len(rest)), middle, usual))
-        return 0.0, False, False, 0.0, np.where(apart < least, 0.0, apart)
-    if arrival is not None:
+        return 0.0, False, True, 0.0
+    if spread < max(LEAST_NOISE_S, 0.005 * found.period):
+        return 0.0, False, False, 0.0
+    if arrival is not None and len(arrival) == len(rest) and found.time is time:
         late = arrival - time + (rest - level)  # what arrival does on top of a steady clock
         own = rest - level
         near = apart < 4.0 * spread
         share = float(own[near] @ (late - late.mean())[near]) / float(own[near] @ own[near])
         doubt = float(late.std()) / (float(own[near].std()) * np.sqrt(near.sum()))
         if share + 3.0 * doubt < 1.0 - UNLIKE and share < UNLIKE:
-            return spread, False, False, 0.0, 0.0
-    return 0.0, False, False, spread, np.maximum(apart, NEARLY_ALL * spread)
+            return spread, False, False, 0.0
+    return 0.0, False, False, spread
+
+
+def _reach(found: _Steps) -> float:
+    """Return by how much a few neighbouring samples, or chunks, differ from evenly spaced ones."""
+    size = FEW_CHUNKS
+    if found.computed:
+        steps = np.diff(found.time)
+        bursts = bool(np.median(steps) < CLUMPED * np.median(found.local))
+        count = int(np.count_nonzero(steps > found.local)) if bursts else _boundaries(found)
+        size *= max(len(found.time) // max(count, 1), 1)
+    rest = found.flowed - found.period * (found.index - found.index[0])
+    whole = len(rest) // size * size
+    return (
+        float(np.quantile(np.ptp(rest[:whole].reshape(-1, size), axis=1), 0.95)) if whole else 0.0
+    )
 
 
 def _boundaries(found: _Steps) -> int:
@@ -494,16 +542,19 @@ def _boundaries(found: _Steps) -> int:
 
 
 def coarse_unit(stamps: FloatArray, *, regular: bool) -> float:
-    """Return the unit of a coarse clock of which stamps are whole ones apart; 0 if none."""
+    """Return the unit of a coarse clock of which stamps are whole ones apart; 0 if there is none.
+
+    Or the ticks that are expressed in it, if these are longer.
+    """
     unit = units.find(stamps)
     if not unit:
         return 0.0
     if not regular or len(stamps) < 2:  # noqa: PLR2004
-        return unit
+        return units.tick(stamps, unit, 0.0)
     period = _typical(np.sort(stamps), np.arange(float(len(stamps))))
     if abs(unit - period) < RATE_CHANGE * period:  # all steps are of one sample, or of some
         return 0.0
-    return unit
+    return units.tick(stamps, unit, period)
 
 
 def _on_grid(found: _Steps, stamps: FloatArray, grid: float) -> bool:

@@ -37,6 +37,7 @@ class Fault(StrEnum):
     SHIFTED = "paused, or delay changed"
     FROZEN = "stamps that stand still"
     REPEATED = "samples sent again"
+    STRAYED = "stamps that stray and return"
     STEPPED = "clock stepped"
     RESTARTED = "restarted"
     SLEPT = "computer slept"
@@ -47,18 +48,26 @@ class Fault(StrEnum):
     PROBES_MISSING = "probes interrupted"
 
 
-_FAULTS: dict[Fault, Callable[[Quality], bool]] = {
+_FAULTS: dict[Fault, Callable[[Quality, float], bool]] = {
+    Fault.INTERRUPTED: lambda q, _: q.longest_gap_s > LONG_S,
+    Fault.WRONG_RATE: lambda q, hz: (
+        np.isnan(q.first_rate_hz) and abs(q.rate_hz / hz - 1.0) > RATE_OFF
+    ),
+    Fault.CHANGED_RATE: lambda q, _: bool(np.isfinite(q.first_rate_hz)),
+    Fault.LATE_STAMPS: lambda q, _: q.late_stamps > 0,
+    Fault.NOISY: lambda q, _: q.noise_s > 0.0 and not q.late_stamps,
+    Fault.SHIFTED: lambda q, _: q.shifts > 0,
+    Fault.FROZEN: lambda q, _: q.frozen > 0,
+    Fault.REPEATED: lambda q, _: q.repeated > 0,
+    Fault.STRAYED: lambda q, _: q.strayed > 0,
+}
+"""Of regular streams only."""
+
+_ANY_STREAMS_FAULTS: dict[Fault, Callable[[Quality], bool]] = {
     Fault.LOST: lambda q: q.dropped > 0,
-    Fault.INTERRUPTED: lambda q: q.longest_gap_s > LONG_S,
     Fault.DISORDERED: lambda q: q.disordered > 0,
     Fault.STALLED: lambda q: q.stalls > 0,
-    Fault.CHANGED_RATE: lambda q: bool(np.isfinite(q.first_rate_hz)),
-    Fault.LATE_STAMPS: lambda q: q.late_stamps > 0,
-    Fault.NOISY: lambda q: q.noise_s > 0.0 and not q.late_stamps,
     Fault.COARSE: lambda q: q.grid_s > 0.0,
-    Fault.SHIFTED: lambda q: q.shifts > 0,
-    Fault.FROZEN: lambda q: q.frozen > 0,
-    Fault.REPEATED: lambda q: q.repeated > 0,
     Fault.DIED: lambda q: q.silent_s > SILENT_S,
     Fault.STEPPED: lambda q: q.steps > 0,
     Fault.RESTARTED: lambda q: q.restarts > 0,
@@ -76,10 +85,9 @@ _FAULTS: dict[Fault, Callable[[Quality], bool]] = {
 
 def faults(quality: Quality, rate_hz: float) -> frozenset[Fault]:
     """Return the faults of a stream with this nominal rate; 0 is irregular."""
-    found = {fault for fault, is_there in _FAULTS.items() if is_there(quality)}
-    steady = rate_hz > 0.0 and np.isnan(quality.first_rate_hz)
-    if steady and abs(quality.rate_hz / rate_hz - 1.0) > RATE_OFF:
-        found.add(Fault.WRONG_RATE)
+    found = {fault for fault, is_there in _ANY_STREAMS_FAULTS.items() if is_there(quality)}
+    if rate_hz > 0.0:
+        found |= {fault for fault, is_there in _FAULTS.items() if is_there(quality, rate_hz)}
     return frozenset(found)
 
 

@@ -68,44 +68,52 @@ def judge_stream(
 ) -> StreamReport:
     """Judge a corrected stream, with what the recorder noted beside it."""
     quality = replace(quality, dropped=max(quality.dropped, _missing(recorded)))
-    samples, rate_hz = len(recorded.time_raw), recorded.header.rate_hz
+    samples = len(recorded.time_raw)
+    header = recorded.header
     if samples == 0:
         findings = [_empty(required=required)]
     else:
-        findings = judge_quality(quality, rate_hz, samples, limits, required=required)
-    return replace(
-        _report(recorded, quality, [*findings, *_noted(recorded), *_unwritten(recorded)]),
-        faults=tuple(sorted(faults(quality, rate_hz))) if samples else (),
-        corrected=tuple(corrections(quality)),
-        unknown=unknowable(quality) if _probed_in_full(recorded) else UNWRITTEN,
-        carries=carries(quality) + ("" if len(recorded.arrivals) or not samples else IF_ITS_OWN),
+        findings = judge_quality(quality, header.rate_hz, samples, limits, required=required)
+    findings += _noted(recorded) + _unwritten(recorded)
+    return StreamReport(
+        header.name,
+        header.type,
+        header.source_id,
+        worst(finding.verdict for finding in findings),
+        samples,
+        header.rate_hz,
+        quality,
+        tuple(findings),
+        tuple(sorted(faults(quality, header.rate_hz))) if samples else (),
+        tuple(corrections(quality)),
+        unknowable(quality) if _probed_in_full(recorded) else UNWRITTEN,
+        carries(quality) + ("" if len(recorded.arrivals) or not samples else IF_ITS_OWN),
+        _taken(recorded),
     )
 
 
 def uncorrected_stream(recorded: RecordedStream, why: str) -> StreamReport:
     """Return the report of a stream whose times could not be corrected."""
+    header, samples, quality = recorded.header, len(recorded.time_raw), Quality()
     finding = Finding(
         Verdict.FAIL,
         f"its clock could not be corrected: {why}",
         "its times are uncorrected; after mending the cause, run labcrane resync",
     )
-    return _report(recorded, Quality(), [finding, *_noted(recorded)])
-
-
-def _report(recorded: RecordedStream, quality: Quality, findings: list[Finding]) -> StreamReport:
-    header = recorded.header
     return StreamReport(
-        name=header.name,
-        type=header.type,
-        source_id=header.source_id,
-        verdict=worst(finding.verdict for finding in findings),
-        samples=len(recorded.time_raw),
-        nominal_hz=header.rate_hz,
-        quality=quality,
-        findings=tuple(findings),
-        unknown=unknowable(quality),
-        carries=carries(quality),
-        taken=_taken(recorded),
+        header.name,
+        header.type,
+        header.source_id,
+        Verdict.FAIL,
+        samples,
+        header.rate_hz,
+        quality,
+        (finding, *_noted(recorded)),
+        (),
+        (),
+        unknowable(quality),
+        carries(quality),
+        _taken(recorded),
     )
 
 
@@ -152,11 +160,12 @@ def _flow(nominal: float, samples: int, quality: Quality, limits: Limits) -> lis
     found: list[Finding] = []
     if nominal > 0:
         off = abs(quality.rate_hz / nominal - 1.0)
-        text = f"{quality.rate_hz:.2f} Hz instead of {nominal:g} Hz"
-        if np.isnan(off):
-            text = f"its {samples} samples do not show at which rate it samples"
-        advice = "check the rate set in the device's program, and whether it drops samples"
-        _add(found, limits.rate.judge(off), text, advice)
+        _add(
+            found,
+            limits.rate.judge(off),
+            f"{quality.rate_hz:.2f} Hz instead of {nominal:g} Hz",
+            "check the rate set in the device's program, and whether it drops samples",
+        )
         if not np.isnan(quality.first_rate_hz):
             _add(
                 found,
@@ -257,6 +266,10 @@ def _order(quality: Quality) -> list[Finding]:
     if quality.frozen:
         text = f"{quality.frozen} samples have the timestamp of the one before"
         _add(found, Verdict.WARN, text, "exclude the trials they are in; check its program")
+    if quality.strayed:
+        text = f"{quality.strayed} samples leave their regular grid for a while: a "
+        text += "clock stopped and caught up, or its sampler waited"
+        _add(found, Verdict.WARN, text, "give a virtual machine a core of its own, or none")
     if quality.repeated:
         text = f"{quality.repeated} samples were sent again with the same timestamp"
         _add(found, Verdict.WARN, text, "remove them before you filter or average it")
@@ -349,9 +362,12 @@ def _certainty(quality: Quality, limits: Limits) -> list[Finding]:
         )
         _add(found, Verdict.WARN, text, "exclude the trial it is in if milliseconds matter")
     if quality.unprobed and not quality.whose:
-        text = f"{quality.unprobed} samples are from a clock that was never probed"
-        advice = "exclude them if milliseconds matter: only their arrival, if recorded, places them"
-        _add(found, Verdict.FAIL, text, advice)
+        _add(
+            found,
+            Verdict.FAIL,
+            f"{quality.unprobed} samples are from a clock that was never probed",
+            "exclude them if milliseconds matter: they are placed by their arrival",
+        )
     if quality.unsure:
         _add(
             found,

@@ -1,8 +1,7 @@
 """Holes between stamps of a regular stream that has no counter: lost samples, or a pause.
 
 A step is a hole if its stamps stay late by it. What a burst behind it makes good was delayed, and
-all of it is there: stamps over their span bound what can be missing. Chunks that are stamped when
-sent wait for as long as their program lets them: only the soonest of them show what was lost.
+all of it is there: stamps over their span bound what can be missing.
 """
 
 from dataclasses import dataclass
@@ -46,14 +45,6 @@ TOLD = 0.25
 """Within more than this part of a period, nothing tells whole ones from others."""
 
 MANY = 200
-
-STEADY = 1.5e-4
-"""No crystal is further off the rate that stamps are computed by: what is, was lost."""
-
-PARTS, SOONEST = 5, 4
-"""The soonest chunks of the first part and of the last tell what was lost between."""
-
-LAST = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +118,7 @@ def find(
     else:
         odd = np.maximum(LONGER * usual, SURE * scatter)
         away = steps - usual
-        usual = usual if exact else _by_spans(steps)
+        usual = _flowing(steps, usual, np.abs(away) <= odd) if exact else _by_spans(steps)
         away = steps - usual
         chosen = away > odd
         if not exact:
@@ -177,6 +168,17 @@ def _by_spans(steps: FloatArray) -> FloatArray:
     return np.full(len(steps), float(np.median(sums[span:] - sums[:-span])) / span)
 
 
+def _flowing(steps: FloatArray, usual: FloatArray, even: npt.NDArray[np.bool_]) -> FloatArray:
+    """Return the mean of usual steps around each, which scatter hardly blurs."""
+    blocks = np.array_split(np.arange(len(steps)), max(len(steps) // MANY, 1))
+    kept = [block[even[block]] for block in blocks]
+    kept = [block for block in kept if len(block) > MANY // 2]
+    if not kept:
+        return usual
+    middle = [float(block.mean()) for block in kept]
+    return np.interp(np.arange(len(steps)), middle, [float(steps[block].mean()) for block in kept])
+
+
 def _alone(odd: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """Return where few other steps around are odd."""
     count = np.r_[0, np.cumsum(odd)]
@@ -201,54 +203,3 @@ def _size(
     if scatter < BROKEN * period:
         return step
     return float(np.median(late[here:end]) - np.median(late[begin:here]))
-
-
-def lost_between(index: FloatArray, rest: FloatArray, period: float) -> tuple[bool, float]:
-    """Return whether samples were lost between chunks, and the period.
-
-    Delays pass, so that some chunk of every while is hardly delayed; what was lost lets even those
-    come later from then on. Where the soonest chunks are too few or too unlike to tell, nothing is
-    said to be lost.
-
-    Parameters
-    ----------
-    index, rest
-        Number of each chunk's first sample, and how late it is stamped by the usual step, in
-        seconds, shape ``(n_chunks,)``.
-    period
-        The usual step, in seconds.
-    """
-    part = len(index) // PARTS
-    if part < SOONEST:
-        return False, period + slope(index, rest)
-    begin, end = np.argsort(rest[:part]), len(rest) - part + np.argsort(rest[-part:])
-    rise = float(rest[end[0]] - rest[begin[0]])
-    doubt = float(np.ptp(rest[begin[:SOONEST]]) + np.ptp(rest[end[:SOONEST]]))
-    apart = float(index[end[0]] - index[begin[0]])
-    if rise > STEADY * apart * period + 2.0 * doubt:
-        return True, period
-    return False, period + rise / apart
-
-
-def lost_before(rest: FloatArray, period: float) -> FloatArray:
-    """Return how many samples were lost before each chunk, shape ``(n_chunks,)``.
-
-    No chunk comes before its samples: what even the soonest of all that follow is late by was lost.
-    The last few may all be late for another reason, and tell nothing.
-
-    Parameters
-    ----------
-    rest
-        How late each chunk is stamped by the usual step, in seconds, shape ``(n_chunks,)``.
-    period
-        Of the samples, in seconds.
-    """
-    soonest = np.minimum.accumulate(rest[::-1])[::-1]
-    known = np.minimum(soonest, soonest[-min(LAST, len(soonest))])
-    return np.asarray(np.round((known - known[0]) / period))
-
-
-def slope(x: FloatArray, y: FloatArray) -> float:
-    """Return the slope of the straight line through points."""
-    away = x - x.mean()
-    return float(away @ (y - y.mean())) / float(away @ away)

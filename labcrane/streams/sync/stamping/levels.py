@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labcrane.streams.sync.stamping.strays import LONG_HOLE
 from labcrane.types import FloatArray
 
 LEAST = 5
@@ -16,9 +17,6 @@ LEAST = 5
 SHARP = 0.1
 """Means of both sides differ by less than this part of a period by chance, a standard deviation:
 half a period, which nothing counts as a loss, is five of them."""
-
-LONG_HOLE = 20
-"""Across holes of more periods the level behind is not known well enough to count them."""
 
 WHOLE = 0.3
 """What was lost makes up whole periods, to three of these standard deviations."""

@@ -1,8 +1,8 @@
 """Receipt: samples of a steady sampler that wait before they are stamped.
 
 A serial port, a USB poll or a radio's connection event hands them over later than they were taken,
-in their order. The count goes on evenly then, and stamps scatter as delays do: behind a lower edge,
-or in chunks that were computed back from one stamp.
+in their order. The count goes on evenly then, nothing is lost, and stamps scatter as delays do:
+behind a lower edge, on the grid of polls, or in chunks that were computed back from one stamp.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ BLOCKS, LEAST = 40, 50
 EDGE = 0.05
 """The part of a block's samples that is sooner than its lower edge."""
 
-STEADY = 0.4
+STEADY, STEADY_POLLED = 0.4, 0.75
 """Edges that stray from a straight line by more periods have lost or gained a sample."""
 
 LITTLE_S = 5e-5
@@ -33,6 +33,9 @@ and the soonest in two hundred. Of errors that scatter by chance it is half and 
 NEW = 0.8
 """Delays are new in each sample: neighbours are less alike than this correlation."""
 
+ON_GRID, NEARLY_ALL = 0.1, 0.95
+SHORTEST_POLL_S = 2e-3
+SOME = 0.01
 EQUAL_S = 3e-6
 SAME = 0.5
 SLICE = 200_000
@@ -49,16 +52,19 @@ class Receipt:
         At 97.5 %: whether samples were taken when they were stamped, or evenly, nothing tells.
     period
         Of the sampler, in seconds.
+    polled
+        Whether stamps lie on the grid of polls: the sampler's phase slides along it for minutes.
     strayed_s
         By how much the soonest samples of a while stray from a steady clock.
     """
 
     spread_s: float
     period: float
+    polled: bool
     strayed_s: float
 
 
-def find(time: FloatArray, index: FloatArray) -> Receipt | None:
+def find(time: FloatArray, index: FloatArray, *, explained: bool = False) -> Receipt | None:
     """Return how samples were received; None where nothing shows that they waited.
 
     Parameters
@@ -67,24 +73,53 @@ def find(time: FloatArray, index: FloatArray) -> Receipt | None:
         Stamps in seconds, shape ``(n,)``, in the order of arrival.
     index
         The sampler's count, shape ``(n,)``.
+    explained
+        Whether the stamps are known to be those of chunks stamped when sent: then only the grid of
+        polls says more.
     """
-    if len(time) < ENOUGH or (np.diff(index) <= 0.0).any() or (np.diff(time) < 0.0).any():
+    steps = np.diff(time)
+    if len(time) < ENOUGH or (np.diff(index) <= 0.0).any():
+        return None
+    computed, polled = _is_computed(steps), _is_polled(steps)
+    # Chunks computed back by a slower rate than theirs reach behind the one before.
+    if (explained and not polled) or ((steps < -EQUAL_S).any() and not computed):
         return None
     period, level = np.polyfit(index - index[0], time - time[0], 1)
     rest = time - time[0] - level - period * (index - index[0])
     period = float(period)
     blocks = np.array_split(rest, min(BLOCKS, len(rest) // LEAST))
-    edges = np.array([float(np.quantile(block, EDGE)) for block in blocks])
+    # Of computed stamps the soonest are exact; of others, one may be soon by chance.
+    edge = 0.0 if computed else EDGE
+    edges = np.array([float(np.quantile(block, edge)) for block in blocks])
     spread = float(np.quantile(np.abs(rest), 0.975))
     if spread < max(LITTLE_S, LITTLE * period):
         return None
     away = np.arange(len(edges)) - (len(edges) - 1) / 2.0
     edges = edges - edges.mean() - away * float(away @ edges) / float(away @ away)
     strayed = float(np.abs(edges).max())
-    late = _is_computed(np.diff(time)) or _is_late(rest)
-    if strayed > min(STEADY * period, 0.5 * spread):
+    if strayed > (STEADY_POLLED if polled else STEADY) * period:
         return None
-    return Receipt(spread, period, strayed) if late else None
+    if polled or computed or (strayed < 0.5 * spread and _is_late(rest)):
+        return Receipt(spread, period, polled, strayed)
+    return None
+
+
+def _is_polled(steps: FloatArray) -> bool:
+    """Whether steps are several multiples of one interval, which is not that of the samples."""
+    long = steps[steps > SHORTEST_POLL_S / 2.0]
+    if len(long) < len(steps) / 50:
+        return False
+    shortest = float(np.quantile(long, 0.02))
+    near = long[np.abs(long - shortest) < 0.1 * shortest]
+    for parts in (1, 2, 3, 4):
+        interval = float(np.median(near)) / parts
+        if interval < SHORTEST_POLL_S:
+            return False
+        multiples = np.round(steps / interval)
+        if (np.abs(steps / interval - multiples) < ON_GRID).mean() > NEARLY_ALL:
+            shares = np.unique(multiples, return_counts=True)[1] / len(steps)
+            return int(np.count_nonzero(shares > SOME)) > 1
+    return False
 
 
 def _is_computed(steps: FloatArray) -> bool:

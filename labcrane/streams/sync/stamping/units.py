@@ -18,7 +18,15 @@ TOLD_S = 1e-6
 MANY = 2000
 """So many different steps show what all of them are multiples of."""
 
+SEVERAL = 4.0
+"""A tick is longer than the unit that it is expressed in, by so much at least."""
+
+NEARLY = 0.01
+"""A tick so near to a part of the period is the sampler's."""
+
 WHOLE = 1e-3
+FEW = 0.25
+"""What is blurred by more than this part of a unit tells nothing of it."""
 
 
 def find(stamps: FloatArray) -> float:
@@ -39,6 +47,27 @@ def find(stamps: FloatArray) -> float:
     return 0.0
 
 
+def tick(stamps: FloatArray, unit: float, period: float) -> float:
+    """Return the ticks that are expressed in a coarse unit; the unit where it is the tick.
+
+    Parameters
+    ----------
+    stamps
+        Of whole ``unit``, in seconds, shape ``(n,)``.
+    unit
+        In seconds.
+    period
+        Of a regular stream; 0 of others.
+    """
+    longer = _common(_steps(stamps, unit / 2.0), 1.01 * unit)
+    if not SEVERAL * unit < longer <= MOST_S:
+        return unit
+    longer = _refined(stamps, longer, 1.05 * unit / longer)
+    parts = period / longer if longer else 0.0
+    by_sampler = period > 0.0 and abs(parts - max(round(parts), 1)) < NEARLY * max(parts, 1.0)
+    return unit if not longer or by_sampler else longer
+
+
 def _steps(stamps: FloatArray, blur: float) -> FloatArray:
     """Return the different steps between neighbours, the shortest first."""
     steps = np.abs(np.diff(stamps))
@@ -49,11 +78,29 @@ def _steps(stamps: FloatArray, blur: float) -> FloatArray:
 
 
 def _common(steps: FloatArray, blur: float) -> float:
-    """Return the least by which steps differ from each other or from none; 0 without steps."""
-    if not len(steps):
-        return 0.0
-    apart = np.diff(steps)
-    return float(min(steps[0], apart[apart > blur].min(initial=np.inf)))
+    """Return what all steps are multiples of, by more than they are blurred; 0 if nothing.
+
+    The longer a step is, the better it tells what it is a multiple of, if it is known of which.
+    """
+    common, doubt = (float(steps[0]) if len(steps) else 0.0), blur
+    for step in map(float, steps):
+        longer, shorter = step, common
+        while True:
+            parts = round(longer / shorter)
+            allowed = blur + doubt * parts
+            if allowed > FEW * shorter:
+                break  # too long to tell
+            rest = abs(longer - parts * shorter)
+            if rest <= allowed:
+                if parts * blur and shorter == common and blur / parts < doubt:
+                    common, doubt = longer / parts, blur / parts
+                else:
+                    common = shorter
+                break
+            longer, shorter, doubt = shorter, rest, allowed
+            if shorter < LEAST_S:
+                return 0.0
+    return common
 
 
 def _refined(stamps: FloatArray, unit: float, nearly: float) -> float:
