@@ -1,7 +1,9 @@
 """Correction of XDF files of any recorder, certified, and compared with pyxdf."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +21,6 @@ from labcrane.streams.sync.report.limits import Limits
 from labcrane.streams.sync.report.stream_report import judge_stream
 from labcrane.streams.sync.report.sync_report import SyncReport
 from labcrane.streams.sync.resync import columns_of, quality_of, treatment_of
-from labcrane.types import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,13 +118,11 @@ def _compared(
         import pyxdf  # noqa: PLC0415 - not everybody has it
     except ImportError:
         return {}, ""
-    theirs: dict[tuple[str, str], FloatArray] = {}
     try:
-        for stream in pyxdf.load_xdf(str(path))[0]:
-            info = stream["info"]
-            theirs[info["name"][0], info["source_id"][0] or ""] = np.asarray(stream["time_stamps"])
+        read = pyxdf.load_xdf(str(path))[0]
     except Exception as error:  # noqa: BLE001 - of a damaged file it raises whatever comes
         return {}, f"{type(error).__name__}: {error}"
+    theirs = {_known_by(stream["info"]): np.asarray(stream["time_stamps"]) for stream in read}
     found = {}
     for one, each in zip(streams, corrected, strict=True):
         other = theirs.get((one.header.name, one.header.source_id))
@@ -133,3 +132,9 @@ def _compared(
             if len(known):
                 found[one.header.name] = float(np.median(known)), float(known.max())
     return found, ""
+
+
+def _known_by(info: Mapping[str, Any]) -> tuple[str, str]:
+    """Return name and source id by pyxdf, which gives an empty list for what is left out."""
+    name, source = ((info.get(key) or [""])[0] or "" for key in ("name", "source_id"))
+    return name, source

@@ -80,6 +80,7 @@ def test_a_buffer_that_shrinks_is_told(seed: int) -> None:
         ({"rtt_p95_s": 0.008}, Verdict.WARN, "4.00 ms may be hidden"),
         ({"probe_age_s": 50.0}, Verdict.FAIL, "up to 50 s without a clock probe"),
         ({"rate_hz": 400.0}, Verdict.FAIL, "400.00 Hz instead of 500 Hz"),
+        ({"rate_hz": math.nan}, Verdict.FAIL, "samples do not show at which rate it samples"),
         ({"gaps": 2, "longest_gap_s": 0.4}, Verdict.WARN, "2 gaps, the longest 0.400 s"),
         ({"lag_s": -1.7e9}, Verdict.FAIL, "its timestamps are -1700000000.000 s before"),
         ({"dropped": 3}, Verdict.WARN, "3 samples are missing"),

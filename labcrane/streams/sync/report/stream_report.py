@@ -160,12 +160,11 @@ def _flow(nominal: float, samples: int, quality: Quality, limits: Limits) -> lis
     found: list[Finding] = []
     if nominal > 0:
         off = abs(quality.rate_hz / nominal - 1.0)
-        _add(
-            found,
-            limits.rate.judge(off),
-            f"{quality.rate_hz:.2f} Hz instead of {nominal:g} Hz",
-            "check the rate set in the device's program, and whether it drops samples",
-        )
+        text = f"{quality.rate_hz:.2f} Hz instead of {nominal:g} Hz"
+        if np.isnan(off):
+            text = f"its {samples} samples do not show at which rate it samples"
+        advice = "check the rate set in the device's program, and whether it drops samples"
+        _add(found, limits.rate.judge(off), text, advice)
         if not np.isnan(quality.first_rate_hz):
             _add(
                 found,
@@ -362,12 +361,9 @@ def _certainty(quality: Quality, limits: Limits) -> list[Finding]:
         )
         _add(found, Verdict.WARN, text, "exclude the trial it is in if milliseconds matter")
     if quality.unprobed and not quality.whose:
-        _add(
-            found,
-            Verdict.FAIL,
-            f"{quality.unprobed} samples are from a clock that was never probed",
-            "exclude them if milliseconds matter: they are placed by their arrival",
-        )
+        text = f"{quality.unprobed} samples are from a clock that was never probed"
+        advice = "exclude them if milliseconds matter: only their arrival, if recorded, places them"
+        _add(found, Verdict.FAIL, text, advice)
     if quality.unsure:
         _add(
             found,
