@@ -1,11 +1,11 @@
 """Devices that vibrate: tactors that take lines of text, and a game controller.
 
 A line of text sets all tactors: ``V 17 128 0``, with the command's number and a level from 0 to 255
-for each. The device answers with the number and its own microseconds: ``E 17 5123044``. It stops by
-itself when no line has come for 200 ms. ``tactors.ino`` beside this file is such a device.
+for each. The device answers with the number, its own microseconds, and how many tactors it has:
+``E 17 5123044 4``. It stops by itself when no line has come for 200 ms. ``tactors.ino`` beside this
+file is such a device.
 """
 
-import math
 import os
 import socket
 import threading
@@ -29,6 +29,9 @@ ANSWER_S, START_S = 1.0, 4.0
 """Longest time without an answer, in a session and at the start: a board restarts when its port is
 opened, and needs two seconds for it."""
 
+FEW = 3
+"""Commands without an answer that are a lost datagram or two, and not a lost device."""
+
 WRITE_S = 0.1
 LISTEN_S = 0.05
 LONGEST, DATAGRAM = 64, 4096
@@ -36,6 +39,9 @@ LONGEST, DATAGRAM = 64, 4096
 
 PULSE_MS = 200
 """How long a controller rumbles when it is not told again."""
+
+DIGITS = 10
+"""Digits of the longest number in an answer."""
 
 UNFELT = 1e-4
 """Level that no motor moves at."""
@@ -100,6 +106,7 @@ class Line(Device):
         self._times: dict[int, float] = {}
         self._answers: deque[Answer] = deque()
         self._broken = ""
+        self._there = 0
         self._closing = threading.Event()
         self._listener = threading.Thread(target=self._listen, daemon=True)
 
@@ -116,10 +123,17 @@ class Line(Device):
                     "(docs/touch.md), and correct port, baud or address"
                 )
             time.sleep(LISTEN_S)
+        if self._there < len(self.levels):
+            self.close()
+            raise DeviceError(
+                f"tactors: names {len(self.levels)}, and the board at {self.name} has "
+                f"{self._there}; name fewer, or add pins to tactors.ino"
+            )
 
     def send(self, levels: Sequence[int]) -> None:
-        unanswered = min(list(self._times.values()), default=math.inf)
-        if self._broken or time.perf_counter() - unanswered > ANSWER_S:
+        unanswered = list(self._times.values())
+        silent = len(unanswered) > FEW and time.perf_counter() - min(unanswered) > ANSWER_S
+        if self._broken or silent:
             said = self._broken or f"they have not answered for {ANSWER_S:g} s"
             raise DeviceError(f"the tactors at {self.name} are lost: {said}; connect them again")
         self._tell(levels)
@@ -169,22 +183,28 @@ class Line(Device):
 
     def _take(self, words: Sequence[bytes], now: float) -> None:
         """Take an answer; what is none, as the noise of a board that starts, is left out."""
-        if len(words) != 3 or words[0] != b"E" or not all(word.isdigit() for word in words[1:]):  # noqa: PLR2004
+        if len(words) != 4 or words[0] != b"E":  # noqa: PLR2004
             return
-        number = int(words[1])
+        if not all(word.isdigit() and len(word) <= DIGITS for word in words[1:]):
+            return
+        number, micros, self._there = (int(word) for word in words[1:])
         if (sent := self._times.pop(number, None)) is None:
             return
         for unanswered in [each for each in list(self._times) if each < number]:
             del self._times[unanswered]
-        self._answers.append((float(number), now - sent, int(words[2]) / 1e6))
+        self._answers.append((float(number), now - sent, micros / 1e6))
 
 
 class SerialTactors(Line):
     """Tactors on a serial port."""
 
     def __init__(self, settings: VibrationSettings) -> None:
-        import serial  # noqa: PLC0415
-
+        try:
+            import serial  # noqa: PLC0415
+        except ImportError as error:
+            raise DeviceError(
+                "driver: serial needs pyserial, which is not installed; pip install 'labcrane[lab]'"
+            ) from error
         super().__init__(len(settings.tactors), str(settings.port))
         try:
             self._port = serial.Serial(
@@ -248,7 +268,10 @@ class UdpTactors(Line):
 
 
 class Rumble(Device):
-    """The motors of a game controller: it has one or two tactors, and no answers."""
+    """The motors of a game controller: it has one or two tactors, and no answers.
+
+    SDL ends a rumble only while it is asked for events, so a thread ends one that is not renewed.
+    """
 
     def __init__(self, settings: VibrationSettings) -> None:
         super().__init__(len(settings.tactors), f"controller {settings.stick}")
@@ -271,19 +294,35 @@ class Rumble(Device):
             )
         self._stick = self._library.Joystick(number - 1)
         self.name += f" ({self._stick.get_name()})"
+        self._lock, self._closing = threading.Lock(), threading.Event()
+        self._watch = threading.Thread(target=self._stop_if_silent, daemon=True)
 
     def begin(self) -> None:
         self._rumble(UNFELT, UNFELT)  # SDL accepts zeros of a controller without motors
         self._stick.stop_rumble()
+        self._watch.start()
 
     def send(self, levels: Sequence[int]) -> None:
         self._rumble(levels[0] / TOP, levels[-1] / TOP)
 
     def _rumble(self, heavy: float, light: float) -> None:
-        if not self._stick.rumble(heavy, light, PULSE_MS):
-            raise DeviceError(f"{self.name} does not rumble; connect one that does, or use tactors")
+        with self._lock:
+            self._ends = time.perf_counter() + 1e-3 * PULSE_MS
+            if not self._stick.rumble(heavy, light, PULSE_MS):
+                raise DeviceError(
+                    f"{self.name} does not rumble; connect one that does, or use tactors"
+                )
+
+    def _stop_if_silent(self) -> None:
+        while not self._closing.wait(LISTEN_S):
+            with self._lock:
+                if time.perf_counter() > self._ends:
+                    self._stick.stop_rumble()
 
     def close(self) -> None:
+        self._closing.set()
+        if self._watch.is_alive():
+            self._watch.join()
         self._stick.stop_rumble()
         self._library.quit()
 

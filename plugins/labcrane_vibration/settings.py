@@ -82,26 +82,20 @@ class VibrationSettings(Settings):
         told: list[str | Within] = []
         if not self._is_constant:
             told.append(Within("how far the tip is from the target", self.far))
-        angles = [None if a is None else math.radians(a) for a in self.tactors.values()]
-        for fact, part in (
-            ("on which side the target is", math.sin),
-            ("whether the target is ahead or behind", math.cos),
-        ):
-            parts = [0.0 if angle is None else part(angle) for angle in angles]
-            if max(parts) - min(parts) > SAME:
-                told.append(fact)
+        told += self._directions
         if self.silent_after_s is not None:
             told.append("whether the tip is inside the target")
         return tuple(told)
 
     def provides(self, machine: Machine) -> Names:
-        return {"object": (), "port": (self.port,) if self.port else ()}
+        own = {"serial": self.port, "udp": self.address, "rumble": f"controller {self.stick}"}
+        return {"object": (), "port": (str(own[self.driver]),)}
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
         found = {}
         if not any(self.amplitude):
             found["amplitude"] = "is 0 at every distance: nothing is felt"
-        elif self._is_constant:
+        elif self._is_constant and not self._directions:
             found["amplitude"] = (
                 f"is {self.amplitude[0]:g} at every distance, and pulse_hz does not change, so "
                 "that nothing is felt of it"
@@ -117,6 +111,20 @@ class VibrationSettings(Settings):
                 "direction; write null for its direction"
             )
         return found
+
+    @property
+    def _directions(self) -> list[str]:
+        """What tactors of several directions tell."""
+        told = []
+        angles = [None if a is None else math.radians(a) for a in self.tactors.values()]
+        for fact, part in (
+            ("on which side the target is", math.sin),
+            ("whether the target is ahead or behind", math.cos),
+        ):
+            parts = [0.0 if angle is None else part(angle) for angle in angles]
+            if max(parts) - min(parts) > SAME:
+                told.append(fact)
+        return told
 
     @property
     def _is_constant(self) -> bool:

@@ -1,5 +1,5 @@
 // Tactors for labcrane: motor drivers on PWM pins, told by lines of text over USB.
-// "V 17 128 0" sets tactor 1 to half and tactor 2 to rest; the answer is "E 17 MICROSECONDS".
+// "V 17 128 0" sets tactor 1 to half and tactor 2 to rest; the answer is "E 17 MICROSECONDS COUNT".
 // All stop when no line has come for 200 ms: a cable that is pulled or a program that dies.
 
 const int PINS[] = {3, 5, 6, 9};
@@ -18,16 +18,19 @@ void rest() {
 void obey() {
   char *at = line;
   if (*at++ != 'V') return;
-  long number = strtol(at, &at, 10);
+  long number = strtol(at, &at, 10), levels[COUNT];
   for (int i = 0; i < COUNT; i++) {
-    long level = strtol(at, &at, 10);  // 0 where none is given
-    analogWrite(PINS[i], (int)(level < 0 ? 0 : level > 255 ? 255 : level));
+    levels[i] = strtol(at, &at, 10);  // 0 where none is given
+    if (levels[i] < 0 || levels[i] > 255) return;  // misread: no answer
   }
+  for (int i = 0; i < COUNT; i++) analogWrite(PINS[i], (int)levels[i]);
   last = millis();
   Serial.print("E ");
   Serial.print(number);
   Serial.print(" ");
-  Serial.println(micros());
+  Serial.print(micros());
+  Serial.print(" ");
+  Serial.println(COUNT);
 }
 
 void setup() {

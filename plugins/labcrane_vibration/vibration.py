@@ -16,6 +16,11 @@ from labcrane_vibration.settings import VibrationSettings
 LIVE = ("far", "amplitude", "pulse_hz", "aside", "silent_after_s")
 """Settings that can change while the device is open."""
 
+ANSWER, ANSWERS = (
+    "answer",
+    (Signal("command", "1"), Signal("delay", "s"), Signal("device.time", "s")),
+)
+
 
 class Vibration(Feedback):
     """Follows the distance and direction of the target with tactors.
@@ -27,10 +32,6 @@ class Vibration(Feedback):
     open_device
         Opens the device; a preview gives another one.
     """
-
-    streams: Mapping[str, tuple[Signal, ...]] = {
-        "answer": (Signal("command", "1"), Signal("delay", "s"), Signal("device.time", "s")),
-    }
 
     def __init__(
         self,
@@ -44,6 +45,8 @@ class Vibration(Feedback):
             Signal("vibration.command", "1"),  # number of the last command, as in its answer
             Signal("vibration.given", "s"),  # time with vibration so far
         )
+        if settings.driver != "rumble":  # a controller does not answer
+            self.streams = {ANSWER: ANSWERS}
         self._settings = settings
         self._open_device = open_device
         self._device: Device | None = None
@@ -93,7 +96,8 @@ class Vibration(Feedback):
         return np.array([amplitude, pulse, *device.levels, device.number, self._given])
 
     def samples(self) -> Mapping[str, FloatArray]:
-        return {"answer": np.array(self._open().answers()).reshape(-1, 3)}
+        found = np.array(self._open().answers()).reshape(-1, len(ANSWERS))
+        return dict.fromkeys(self.streams, found)
 
     def idle(self) -> None:
         device = self._open()

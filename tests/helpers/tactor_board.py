@@ -62,8 +62,9 @@ struct Port {
   }
   void print(const char *text) { n += snprintf(out + n, sizeof(out) - n, "%s", text); }
   void print(long value) { n += snprintf(out + n, sizeof(out) - n, "%ld", value); }
-  void println(unsigned long value) {
-    n += snprintf(out + n, sizeof(out) - n, "%lu\r\n", value);
+  void print(unsigned long value) { n += snprintf(out + n, sizeof(out) - n, "%lu", value); }
+  void println(int value) {
+    n += snprintf(out + n, sizeof(out) - n, "%d\r\n", value);
     if (write(line_fd, out, n) != n) exit(1);
     n = 0;
   }

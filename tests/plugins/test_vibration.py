@@ -160,6 +160,8 @@ def test_settings_that_cannot_be_met_are_refused(keys: dict, said: str) -> None:
 def test_check_asks_about_what_is_not_felt(keys: dict, key: str) -> None:
     assert set(settings(**keys).doubts(ch8())) == {key}
     assert not settings().doubts(ch8())
+    by_side = settings(amplitude=[0.4, 0.4], pulse_hz=None, tactors={"left": 90, "right": -90})
+    assert not by_side.doubts(ch8())
 
 
 def test_above_the_minutes_of_a_session_it_stops_and_fails(run: Run) -> None:
@@ -275,6 +277,8 @@ def test_a_board_that_dies_is_lost_by_name(
 def test_a_controller_rumbles_with_its_heavy_and_its_light_motor(run: Run) -> None:
     with desk() as table:
         stick = table.plug(motors=True)
+        told = settings(driver="rumble").provides(ch8())["port"]
+        assert told == ("controller 1",)
         made = Vibration(settings(driver="rumble", pulse_hz=None, amplitude=[0.8, 0.8],
                                   tactors={"left": 90, "right": -90}, aside=1.0))  # fmt: skip
         made.open(run)
@@ -285,8 +289,13 @@ def test_a_controller_rumbles_with_its_heavy_and_its_light_motor(run: Run) -> No
         assert stick.rumbled[-1] == pytest.approx((0, 0.8 * 65535), abs=200)
         made.idle()
         assert stick.rumbled[-1] == (0, 0)
+        assert not made.samples()
+        time.sleep(0.02)
+        made.present(at(run, (0.0, -1.0, 0.0), 0.15))
+        until(lambda: stick.rumbled[-1] == (0, 0))  # a session that hangs gives no frame
         time.sleep(0.02)
         made.present(at(run, (0.0, -1.0, 0.0), 0.2))
+        assert any(stick.rumbled[-1])
         made.close()
         assert stick.rumbled[-1] == (0, 0)
 
@@ -299,6 +308,38 @@ def test_a_controller_that_is_not_there_or_does_not_rumble_is_named(run: Run) ->
         table.plug(name="Dumb")
         with pytest.raises(DeviceError, match=r"controller 1 \(Dumb\) does not rumble; connect"):
             wanted.open(run)
+
+
+@needs("g++")
+@pytest.mark.slow
+def test_a_board_with_fewer_tactors_is_refused_and_does_nothing_that_it_misread(
+    run: Run, tmp_path: Path
+) -> None:
+    with serial_board(tmp_path) as there:
+        made = Vibration(settings(port=there.address, tactors=dict.fromkeys("abcde")))
+        with pytest.raises(DeviceError, match=r"names 5, and the board at .* has 4; name fewer"):
+            made.open(run)
+        made.close()
+    with serial_board(tmp_path) as there:
+        line = device.opened(settings(port=there.address))
+        line.write(b"V 7 12128 0\n")
+        line.write(b"E 1 " + 400 * b"9" + b" 4\n")
+        line.set([0.5])
+        until(there.vibrates)
+        assert [level for _, _, level in there.changes()] == [128]
+        line.close()
+
+
+@needs("g++")
+@pytest.mark.slow
+def test_a_lost_datagram_does_not_lose_the_device(run: Run, tmp_path: Path) -> None:
+    with udp_board(tmp_path) as there:
+        line = device.opened(settings(driver="udp", address=there.address))
+        line._times[line.number + 1] = time.perf_counter() - 5.0  # type: ignore[attr-defined]
+        line.number += 1
+        line.set([0.5])
+        until(there.vibrates)
+        line.close()
 
 
 @needs("g++")
