@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from labcrane import Feedback, Machine, Offer, hookimpl, offer
 from labcrane.core import Finding
-from labcrane.registry import Prompt
+from labcrane.registry import LAB, Prompt
 from labcrane_vibration.settings import VibrationSettings
 
 labcrane_api = 1
@@ -24,4 +24,5 @@ def labcrane_feedback() -> list[Offer[Feedback]]:
         del ask  # nothing needs to be moved
         return examine(settings)
 
-    return [offer("vibration", VibrationSettings, build, examine)]
+    needs = {"pygame": LAB, "serial": LAB}
+    return [offer("vibration", VibrationSettings, build, examine, needs=needs)]

@@ -35,8 +35,6 @@ ANY: dict[str, str] = {
     "ViewSettings.screens": A_NUMBER_OF,
     "Criterion.successes": "is asked about where there are fewer trials",
     "Step.seconds": "is asked about by the questions about breaks",
-    "ViewSettings.viewing_m": ITS_DOUBTS,
-    "ViewSettings.text_arcmin": ITS_DOUBTS,
     "LoadedCraneSettings.payload_kg": ITS_DOUBTS,
     "QuestPlus.guess": SHARE,
     "OperatorSettings.lapse_rate": SHARE,
