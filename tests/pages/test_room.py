@@ -178,7 +178,7 @@ def test_the_lamp_names_every_trigger_that_is_lost() -> None:
         *(("trigger.lost", {"trigger": name, "why": f"{name}: pulled out"}) for name in ("a", "b")),
     ]
     lamp = lamp_of(after(*lost), Punctual(), EXPECTED)
-    assert (lamp.level, lamp.reason) == ("bad", "trigger failed: a: pulled out")
+    assert (lamp.level, lamp.reason) == ("bad", "trigger failed: a: pulled out (and 1 more)")
     assert "plug the device in" in lamp.remedy
     lost.append(("trigger.back", {"trigger": "a"}))
     assert lamp_of(after(*lost), Punctual(), EXPECTED).reason == "trigger failed: b: pulled out"

@@ -29,6 +29,13 @@ const all = [...document.querySelectorAll('button, select, input[type=range]')];
 return all.filter(e => !e.inert).length;
 """
 
+WALL = "document.querySelector('.room').classList.toggle('wall')"
+OLD_WALL = """
+const style = (which) => getComputedStyle(document.querySelector(which));
+return [Math.min(60, parseFloat(style('#stale').fontSize)), style('.room-big').visibility];
+"""
+"""On the wall: how large the banner is, up to 60 px, and whether an old status is seen."""
+
 
 def waits(browser: webdriver.Chrome, words: str) -> float:
     """Return how long it took until the page said that it is old."""
@@ -57,6 +64,9 @@ def test_the_control_room_of_a_server_that_stands_still_or_dies_says_so_and_orde
             assert bar["width"] == browser.execute_script("return document.body.clientWidth")
             keys(browser, " ", "p")
             check(browser, "supervisor-stale")
+            browser.execute_script(WALL)
+            assert browser.execute_script(OLD_WALL) == [60, "hidden"]
+            browser.execute_script(WALL)
         finally:
             told.signal(signal.SIGCONT)
         wait_for(lambda: not text(browser, "stale"))

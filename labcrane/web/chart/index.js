@@ -7,11 +7,13 @@ const axis = { type: "value", scale: true, nameTextStyle: { color: "var(--faint)
 
 export const short = (value) => String(Number(Number(value).toPrecision(4)));
 
-export const axes = (across, up, between = {}) => ({
+// The vertical axis holds what is marked in the chart, too, of which ECharts takes no account.
+export const axes = (across, up, between = {}, marked = []) => ({
   animation: false, tooltip: { trigger: "axis", confine: true, valueFormatter: short },
   grid: { left: 60, right: 16, top: 28, bottom: 40 },
   xAxis: { ...axis, name: across, nameLocation: "middle", nameGap: 24, ...between },
-  yAxis: { ...axis, name: up, nameTextStyle: { ...axis.nameTextStyle, align: "left", padding: [0, 0, 0, -50] } },
+  yAxis: { ...axis, name: up, nameTextStyle: { ...axis.nameTextStyle, align: "left", padding: [0, 0, 0, -50] },
+    ...(marked.length && { min: ({ min }) => Math.min(min, ...marked), max: ({ max }) => Math.max(max, ...marked) }) },
 });
 
 export const Chart = {

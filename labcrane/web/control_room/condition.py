@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from labcrane.analysis.presented import PresentedLimits
 from labcrane.recording.pictures import LOG
@@ -144,9 +144,10 @@ def lamp_of(view: SessionView, live: Live, expected: ExpectedSession, trouble: s
                 "the session and its views continue; report it to your labcrane maintainer",
             )
         )
-    worst = next((one for one in found if one.level == "bad"), None)
-    if worst or found:
-        return worst or found[0]
+    worst = [one for one in found if one.level == "bad"] or found
+    if worst:
+        more = f" (and {len(worst) - 1} more)" if len(worst) > 1 else ""
+        return replace(worst[0], reason=worst[0].reason + more)
     paused = EXAMINER in view.standing.holds
     return Lamp("ok", "paused by you; all is well" if paused else "all is well")
 

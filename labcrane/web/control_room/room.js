@@ -217,7 +217,7 @@ export default {
         markArea: { silent: true, itemStyle: { color: "var(--band)" }, data: [[{ yAxis: low }, { yAxis: high }]] },
         markLine: { silent: true, symbol: "none", label: { show: false }, lineStyle: { color: "var(--mine)" }, data: [{ yAxis: median }] },
       };
-      return { ...axes("trial, of all sessions", this.s.measures.find((m) => m.name === this.measure)?.label),
+      return { ...axes("trial, of all sessions", this.s.measures.find((m) => m.name === this.measure)?.label, {}, (cohort ?? []).slice(0, 3)),
         series: [{ ...dots("this session", mine, before.length, "var(--mine)"), ...others }, dots("earlier", before, 0, "var(--before)")] };
     },
     said() {
@@ -234,7 +234,7 @@ export default {
       const line = (name, of) => ({ name, type: "line", symbol: "none", emphasis: { disabled: true }, lineStyle: { color: "var(--fill)" },
         data: this.s.late.map((band, at) => [(at - this.s.late.length) / 2, band[of]]) });
       const tick = { silent: true, symbol: "none", lineStyle: { color: "var(--bad)" }, label: { show: false }, data: [{ yAxis: this.s.tickMs }] };
-      return { ...axes("s before now", "late, ms"), series: [{ ...line("worst", 1), markLine: tick }, line("median", 0)] };
+      return { ...axes("s before now", "late, ms", {}, [0, 2 * this.s.tickMs]), series: [{ ...line("worst", 1), markLine: tick }, line("median", 0)] };
     },
   },
   watch: {
