@@ -43,7 +43,8 @@ class VibrationSettings(Settings):
     """Address of the tactors for UDP: ``192.168.0.20:9000``."""
 
     stick: PositiveInt = 1
-    """Number of the controller that rumbles, from 1, in the order of ``labcrane doctor``."""
+    """Number of the controller that rumbles, from 1, as SDL counts them; ``labcrane doctor`` says
+    its name."""
 
     tactors: Annotated[dict[str, Degrees | None], Field(min_length=1, max_length=8)] = Field(
         default={"seat": None}
@@ -63,8 +64,8 @@ class VibrationSettings(Settings):
     pulses."""
 
     aside: Annotated[PositiveFloat, Unit("m")] = 2.0
-    """Horizontal distance, in metres, from which on only the tactors on the target's side
-    vibrate."""
+    """Horizontal distance, in metres, from which on a tactor of the opposite direction is at rest;
+    at a smaller one it still vibrates a little."""
 
     silent_after_s: NonNegativeFloat | None = 0.3
     """Seconds inside the target after which the vibration stops; null lets it go on."""
