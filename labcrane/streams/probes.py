@@ -67,13 +67,3 @@ class ClockProbe:
             return None
         self._last = remote.value
         return Probe(remote.value, float(offset), rtt.value, float(self._now()))
-
-
-def was_reset(inlet: "pylsl.StreamInlet") -> bool:
-    """Whether the source was replaced since the last call, perhaps by one with another clock.
-
-    Only known of sources that were probed before.
-    """
-    from pylsl.lib import lib  # noqa: PLC0415
-
-    return bool(lib.lsl_was_clock_reset(inlet.obj))

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pylsl
 import pytest
 import pyxdf
 from streams.emulation import HERE, Lab, stop, until, until_ready
@@ -18,7 +19,9 @@ from labcrane.recording.paths import parts
 from labcrane.recording.xdf.reader import read_xdf
 from labcrane.streams.discovery import discover
 from labcrane.streams.network import VARIABLE
+from labcrane.streams.recorder.recorder import Recorder
 from labcrane.streams.request import StreamRequest
+from labcrane.streams.search import Search
 
 EEG = {"label": "EEG", "type": "EEG", "several": True}
 AMPLIFIER = {"label": "EEG", "type": "EEG", "name": "Amplifier"}
@@ -161,7 +164,10 @@ def test_two_programs_with_one_source_id_are_warned_of(lab):
 
 
 @pytest.mark.slow
-def test_a_source_that_comes_back_from_another_session_is_warned_of(lab, tmp_path, monkeypatch):
+def test_a_source_of_another_lsl_session_is_not_taken_for_one_that_is_gone(
+    lab, tmp_path, monkeypatch
+):
+    """Two laboratories have one network, and amplifiers of one source_id."""
     ours = Path(os.environ[VARIABLE])
     theirs = tmp_path / "theirs.cfg"
     lines = (line for line in ours.read_text("utf-8").splitlines() if "SessionID" not in line)
@@ -172,16 +178,44 @@ def test_a_source_that_comes_back_from_another_session_is_warned_of(lab, tmp_pat
     first.kill()
     with monkeypatch.context() as patch:
         patch.setenv(VARIABLE, str(theirs))
-        lab.sender("Amplifier", "EEG", "amplifier-1")
-    status = until(
-        recorder,
-        lambda status: "outside this LSL session" in " ".join(status["streams"][0]["warnings"]),
-    )
-    assert "another laboratory; give every device a unique source_id" in " ".join(
-        status["streams"][0]["warnings"]
-    )
+        lab.sender("Amplifier", "EEG", "amplifier-1", first=5_000_000)
+    until(recorder, lambda status: (status["streams"][0]["silent_s"] or 0.0) > 5.0)
+    lab.sender("Amplifier", "EEG", "amplifier-1", first=1_000_000)
+    until(recorder, lambda status: status["streams"][0]["resets"] == 1)
+    until_ready(recorder)
     assert stop(recorder) == 0
-    assert "warning" in events(lab.streams()["Amplifier"])
+    counts = lab.streams()["Amplifier"].data[:, 0]
+    assert 1_000_000 <= counts.max() < 5_000_000
+
+
+def test_a_source_that_no_search_finds_goes_on_being_recorded_when_its_parent_tells(
+    tmp_path, monkeypatch
+):
+    """A view is killed and started again while all of the ports that LSL asks are taken."""
+    monkeypatch.setattr(Search, "results", lambda _: [])
+    journal = tmp_path / "ses-01_streams.xdf"
+    recorder = Recorder(journal, [StreamRequest("view", name="View")])
+    for first, label in ((0, "shown"), (20, "seen")):
+        described = pylsl.StreamInfo("View", "Frames", 1, 0.0, "double64", f"view-{os.getpid()}")
+        channel = described.desc().append_child("channels").append_child("channel")
+        channel.append_child_value("label", label)
+        outlet = pylsl.StreamOutlet(described)
+        recorder.know([outlet.get_info().as_xml()])
+        assert outlet.wait_for_consumers(60.0)
+        for count in range(first, first + 20):
+            outlet.push_sample([float(count)])
+        deadline = time.monotonic() + 60.0
+        while recorder.health()[0].samples < first + 20:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        del outlet
+    (health,) = recorder.health()
+    assert recorder.close()
+    (stream,) = (each for each in read_streams(parts(journal))[0] if each.header.name == "View")
+    assert stream.data[:, 0].tolist() == [*range(40)]
+    (reset,) = (note.data for note in stream.notes if note.data["event"] == "reset")
+    assert reset["samples"] == [20, 20]
+    assert "check the montage, ('seen',) now" in " ".join(health.warnings)
 
 
 @pytest.mark.slow

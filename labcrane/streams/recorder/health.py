@@ -26,8 +26,7 @@ WINDOW_S = 5.0
 class Flow:
     """What has come so far; read by the watchdog while the inlet's threads write it.
 
-    Times are ours, in seconds; ``last`` is NaN before the first sample, ``reset_at`` before the
-    source was replaced.
+    Times are ours, in seconds; ``last`` is NaN before the first sample.
     """
 
     samples: int = 0
@@ -36,9 +35,10 @@ class Flow:
     probe: Probe | None = None
     probes: int = 0
     resets: int = 0
-    reset_at: float = float("nan")
     missing: int = 0
     fault: str | None = None
+    warnings: list[str] = field(default_factory=list)
+    """What is not as it was of a source that came back."""
 
     def came(self, time: float, count: int) -> None:
         """Count samples that arrived, and keep the last ten seconds of it."""

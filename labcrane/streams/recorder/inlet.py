@@ -12,7 +12,7 @@ from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import COUNTER_GAP, OPENED, RESET, TAKEN
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.recording.xdf.writer import XdfWriter
-from labcrane.streams.probes import ClockProbe, was_reset
+from labcrane.streams.probes import ClockProbe
 from labcrane.streams.recorder.companions import RecordedStreamWriter
 from labcrane.streams.recorder.health import Counter, Flow
 from labcrane.streams.recorder.signal_feed import SignalFeed, SignalTap
@@ -34,7 +34,9 @@ MOST = 8192
 class Inlet:
     """Receives a stream in two threads, one for samples, one for clock probes.
 
-    liblsl corrects nothing here: its own correction mis-stamps samples when a source restarts.
+    liblsl corrects nothing here: its own correction mis-stamps samples when a source restarts. Nor
+    does it search for a source that is gone: it would take any that looks alike, and would find
+    none whose ports are out of reach. The recorder finds it, and tells by :meth:`follow`.
 
     Parameters
     ----------
@@ -70,9 +72,11 @@ class Inlet:
         self._taken = taken
         self._stop = threading.Event()
         self._give_up = threading.Event()
+        self._leave = threading.Event()
         self._companions: RecordedStreamWriter | None = None
-        self._nothing_since: int | None = None
-        """Where the source was replaced, as long as no sample of another one is known."""
+        self._next: pylsl.StreamInfo | None = None
+        self._clock: ClockProbe | None = None
+        self._silent = False
         self.signals = None if feed is None else SignalTap(feed, self.note)
         name = info.name()
         self._threads = [
@@ -85,6 +89,15 @@ class Inlet:
     def alive(self) -> bool:
         """Whether anything is still being received or written."""
         return any(thread.is_alive() for thread in self._threads)
+
+    def follow(self, info: "pylsl.StreamInfo") -> None:
+        """Receive this source of the stream as soon as the present one is lost."""
+        if info.uid() != self.info.uid():
+            self._next = info
+
+    def leave(self) -> None:
+        """Take the present source for lost: its connection was never closed."""
+        self._leave.set()
 
     def note(self, event: str, **data: object) -> None:
         """Write a note beside the stream; left out before its header is known."""
@@ -117,14 +130,9 @@ class Inlet:
                 )
 
     def _receive(self) -> None:
-        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
-
-        inlet = pylsl.StreamInlet(
-            self.info, max_buflen=BUFFER_S, recover=True, processing_flags=0, as_numpy=True
-        )
-        header = self._ask(inlet)
-        if header is None:
+        if (found := self._connected()) is None:
             return
+        inlet, header = found
         counter = Counter.of(header, self._counter_label)
         opened: list[RecordedStreamWriter] = []
         self._insist(lambda: opened.append(RecordedStreamWriter(self._writer, header)))
@@ -139,76 +147,99 @@ class Inlet:
             self.note(TAKEN, text=self._taken)
         if self.signals is not None:
             self.signals.begin(header)
+        self._clock = ClockProbe(inlet)
         prober = threading.Thread(
             target=self._watched,
-            args=(partial(self._probe, ClockProbe(inlet), companions),),
+            args=(partial(self._probe, companions),),
             name=f"probe {header.name}",
             daemon=True,
         )
         self._threads.append(prober)
         prober.start()
-        self._open(inlet)
-        silent = False
         while True:
             stopping = self._stop.wait(PULL_S)
-            came = self._pull(inlet, companions, counter)
-            silent = self._mark_silence(silent=silent, came=came)
+            came, lost = self._pull(inlet, companions, counter)
+            self._mark_silence(came=came)
             if stopping:
                 break
+            if (lost or self._leave.is_set()) and (again := self._connected(header)) is not None:
+                inlet = again[0]
+                self._clock = ClockProbe(inlet)
+                if counter is not None:
+                    counter.forget()
         prober.join()
 
-    def _ask(self, inlet: "pylsl.StreamInlet") -> StreamHeader | None:
-        """Return the full header; None when recording ends before the source tells."""
+    def _connected(
+        self, before: StreamHeader | None = None
+    ) -> "tuple[pylsl.StreamInlet, StreamHeader] | None":
+        """Return a source that sends to us, and its header; None when recording ends before.
+
+        It may be the one that was lost: then only the network was away.
+        """
         while not self._stop.is_set():
-            try:
-                return StreamHeader.from_xml(inlet.info(timeout=1.0).as_xml())
-            except (TimeoutError, RuntimeError):  # lost again: pylsl's LostError is a RuntimeError
-                continue
-            except RecordingError as error:
-                self.flow.fault = str(error)
-                return None
+            for info in filter(None, (self._next, self.info)):
+                try:
+                    inlet, header = _open(info)
+                except (TimeoutError, RuntimeError):  # pylsl's LostError is a RuntimeError
+                    continue
+                except RecordingError as error:
+                    self.flow.fault = str(error)
+                    return None
+                if before is not None and info.uid() != self.info.uid():
+                    self._replaced(info, before, header)
+                self.info, self._next = info, None
+                self._leave.clear()
+                return inlet, header
+            self._mark_silence(came=False)
+            self._stop.wait(RETRY_S)
         return None
 
-    def _open(self, inlet: "pylsl.StreamInlet") -> None:
-        while not self._stop.is_set():
-            try:
-                inlet.open_stream(timeout=1.0)
-            except (TimeoutError, RuntimeError):
-                continue
-            return
+    def _replaced(
+        self, info: "pylsl.StreamInfo", before: StreamHeader, header: StreamHeader
+    ) -> None:
+        """Note that the next sample is another source's, and what about it is not as it was."""
+        first = self.flow.samples
+        self.flow.resets += 1
+        self.note(RESET, samples=[first, first])
+        if info.hostname() != self.info.hostname():
+            self._warn(
+                f"was sent by {self.info.hostname()} and came back from {info.hostname()}: check "
+                "that it is the same one"
+            )
+        if header.channels != before.channels:
+            self._warn(
+                "came back with other labels, types or units of its channels; the recording keeps "
+                f"the first: check the montage, {header.labels} now"
+            )
+
+    def _warn(self, text: str) -> None:
+        if text not in self.flow.warnings:
+            self.flow.warnings.append(text)
+            self.note("warning", text=text)
 
     def _pull(
         self, inlet: "pylsl.StreamInlet", companions: RecordedStreamWriter, counter: Counter | None
-    ) -> bool:
-        """Write down all that has come; whether anything had."""
+    ) -> tuple[bool, bool]:
+        """Write down all that has come; whether anything had, and whether the source is lost."""
         chunks = []
-        while True:
+        lost = False
+        waiting = MOST
+        while waiting in (0, MOST):
+            # Not more than there are: liblsl drops what it has pulled if it finds a loss then.
+            waiting = min(inlet.samples_available(), MOST)
             try:
-                data, stamps = inlet.pull_chunk(0.0, MOST)
-            except RuntimeError:  # lost, and not to be found again
-                return False
-            chunks.append((_now(), np.asarray(stamps), np.asarray(data)))
-            if len(stamps) < MOST:
+                data, stamps = inlet.pull_chunk(0.0, waiting or 1)
+            except RuntimeError:
+                lost = True
                 break
-        # Polled after the pull and before anything is written: the first sample of the other
-        # source is among these, or will be the next.
-        if reset := was_reset(inlet):
-            first = self.flow.samples
-            where = [first, first + sum(len(stamps) for _, stamps, _ in chunks)]
-            # liblsl may try twice until it has a source: one break, when nothing came between.
-            if self._nothing_since != first:
-                self.flow.resets += 1
-                self.flow.reset_at = _now()
-                self.note(RESET, samples=where)
-            self._nothing_since = first if where[0] == where[1] else None
-            if counter is not None:
-                counter.forget()
+            if not len(stamps):
+                break
+            chunks.append((_now(), np.asarray(stamps), np.asarray(data)))
         for arrival, stamps, data in chunks:
-            if len(stamps):
-                self._take(stamps, data, arrival, companions)
-                if counter is not None and not reset:
-                    self._count(counter, data)
-        return any(len(stamps) for _, stamps, _ in chunks)
+            self._take(stamps, data, arrival, companions)
+            if counter is not None:
+                self._count(counter, data)
+        return bool(chunks), lost
 
     def _take(
         self, stamps: FloatArray, data: FloatArray, arrival: float, companions: RecordedStreamWriter
@@ -226,21 +257,21 @@ class Inlet:
             first = self.flow.samples - len(data)
             self.note(COUNTER_GAP, missing=missing, samples=[first, first + len(data)])
 
-    def _mark_silence(self, *, silent: bool, came: bool) -> bool:
+    def _mark_silence(self, *, came: bool) -> None:
         """Note where a regular stream falls silent, and where it goes on."""
         if self.header is None or self.header.rate_hz <= 0.0:
-            return False
-        if silent and came:
+            return
+        if self._silent and came:
+            self._silent = False
             self.note("flows", sample=self.flow.samples)
-            return False
-        if not silent and not came and _now() - self.flow.last > SILENT_S:
+        elif not self._silent and not came and _now() - self.flow.last > SILENT_S:
+            self._silent = True
             self.note("silent", sample=self.flow.samples)
-            return True
-        return silent
 
-    def _probe(self, clock: ClockProbe, companions: RecordedStreamWriter) -> None:
+    def _probe(self, companions: RecordedStreamWriter) -> None:
         while not self._stop.wait(PROBE_S):
-            if (probe := clock.new()) is not None:
+            clock = self._clock
+            if clock is not None and (probe := clock.new()) is not None and clock is self._clock:
                 self.flow.probe = probe
                 self.flow.probes += 1
                 self._insist(partial(companions.probe, probe))
@@ -257,6 +288,18 @@ class Inlet:
             else:
                 self.flow.fault = None
                 return
+
+
+def _open(info: "pylsl.StreamInfo") -> "tuple[pylsl.StreamInlet, StreamHeader]":
+    """Return an inlet that receives from now on, and the full header."""
+    import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
+    inlet = pylsl.StreamInlet(
+        info, max_buflen=BUFFER_S, recover=False, processing_flags=0, as_numpy=True
+    )
+    header = StreamHeader.from_xml(inlet.info(timeout=1.0).as_xml())
+    inlet.open_stream(timeout=1.0)
+    return inlet, header
 
 
 def _now() -> float:

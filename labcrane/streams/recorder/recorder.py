@@ -78,11 +78,8 @@ class Recorder:
         self._candidates: dict[str, list[Candidate]] = {}
         self._writer = XdfWriter(next_part(journal) if part is None else part_path(journal, part))
         self._streams: dict[_Key, _Recorded] = {}
-        self._latest: dict[_Key, pylsl.StreamInfo] = {}
         self._there: set[_Key] = set()
         self._since: dict[str, float] = {}
-        self._unseen: dict[_Key, float] = {}
-        """Since when no search finds a stream, on our clock."""
         self._rivalled: set[_Key] = set()
         self._fault: str | None = None
         self._feed = None if monitors is None else SignalFeed(monitors)
@@ -106,10 +103,10 @@ class Recorder:
         self._there = {_key(info) for info in found}
         self._candidates = {}
         for info in found:
-            self._latest[_key(info)] = info  # one that was started again has other ports
             self._start(info)
         self._find_duplicates(found, now)
-        self._find_strangers(found)
+        self._leave_the_gone()
+        self._note_returned()
         self._note_rivals()
         if self._feed is not None:
             self._feed.look()
@@ -118,7 +115,6 @@ class Recorder:
         """Record streams on this computer from their descriptions, without a search."""
         for info in map(known_stream, descriptions):
             if info is not None:
-                self._latest[_key(info)] = info
                 self._start(info)
 
     def confirm(self, label: str, meant: Identity) -> None:
@@ -143,8 +139,8 @@ class Recorder:
 
     def status(self) -> dict[str, Any]:
         """Return how the recording is, ready for JSON."""
-        streams, recorded = self.health(), self._streams.items()
-        faults = {self._fault, *(one.inlet.flow.fault for one in self._streams.values())} - {None}
+        streams, recorded = self.health(), self._streams.values()
+        faults = {self._fault, *(one.inlet.flow.fault for one in recorded)} - {None}
         return {
             "journal": str(self.path),
             "bytes": self._writer.size,
@@ -152,7 +148,7 @@ class Recorder:
             "ready": all(one.sane for one in streams if one.required) and not faults,
             "faults": sorted(str(fault) for fault in faults),
             "streams": [one.as_json() for one in streams],
-            "known": [self._latest.get(key, one.inlet.info).as_xml() for key, one in recorded],
+            "known": [one.inlet.info.as_xml() for one in recorded],
             "monitors": self._feed.fault if self._feed else None,
         }
 
@@ -192,10 +188,13 @@ class Recorder:
         return next((one for one in self._requests if one.matches(info)), None)
 
     def _start(self, info: "pylsl.StreamInfo") -> None:
-        """Record a stream, unless it is recorded already or nobody asked for it."""
+        """Record a stream that was asked for; one that came back goes on where it was."""
         key = _key(info)
         request = self._wanted(info)
-        if request is None or key in self._streams:
+        if request is None:
+            return
+        if (recorded := self._streams.get(key)) is not None:
+            recorded.inlet.follow(info)
             return
         if request.asks:
             known = self._candidates.setdefault(request.label, [])
@@ -207,8 +206,6 @@ class Recorder:
         taken = request.taken(info.name(), info.source_id(), info.hostname())
         if (unstable := unstable_id(info.source_id())) is not None:
             warnings.append(unstable)
-        before = [one for one in self._streams if one[:3] == key[:3] and one not in self._there]
-        warnings += [_returned(one, key) for one in before[-1:]]
         inlet = Inlet(info, self._writer, request.counter, (*warnings,), self._feed, taken)
         self._streams[key] = _Recorded(request, inlet, misfits, warnings, taken or "")
 
@@ -216,6 +213,18 @@ class Recorder:
         """Say how a stream came back that has another shape now; None if it is there, or gone."""
         now = (one for one in self._there if one[:3] == key[:3] and one in self._streams)
         return None if key in self._there else next((_returned(key, one) for one in now), None)
+
+    def _note_returned(self) -> None:
+        """Note once beside each stream that it is another that came back in another shape."""
+        for key, one in self._streams.items():
+            gone = [was for was in self._before(key) if was not in self._there]
+            if gone and key in self._there and one.inlet.header:
+                one.warn(_returned(gone[-1], key))
+
+    def _before(self, key: _Key) -> list[_Key]:
+        """Return the streams of one source that were recorded before it had this shape."""
+        alike = [one for one in self._streams if one[:3] == key[:3]]
+        return alike[: alike.index(key)]
 
     def _note_rivals(self) -> None:
         """Note once beside each stream that it is not the only one that fits."""
@@ -254,37 +263,17 @@ class Recorder:
                     f"has source_id {key[0]!r} in {len(alike)} programs, on {hosts}: stop one"
                 )
 
-    def _find_strangers(self, found: "list[pylsl.StreamInfo]") -> None:
-        """Warn of a source that came back and may be another: liblsl takes any that looks alike.
+    def _leave_the_gone(self) -> None:
+        """Let go of a source that no search finds and that sends nothing, where another is there.
 
-        What it searches for when it has lost a source is the name, the type, the source_id and the
-        shape, in every LSL session and on every computer.
+        A computer that lost its power does not close its connection.
         """
+        now = time.perf_counter()
         for key, recorded in self._streams.items():
             flow = recorded.inlet.flow
-            if (now_on := self._alike(recorded, found)) is None:
-                if self._shape_now(key) is not None:
-                    continue
-                since = max(self._unseen.setdefault(key, time.perf_counter()), flow.reset_at)
-                if flow.resets and flow.last - since > 2 * FORGET_S:
-                    recorded.warn(
-                        "came back outside this LSL session: it may belong to another laboratory; "
-                        "give every device a unique source_id"
-                    )
-                continue
-            self._unseen.pop(key, None)
-            if flow.resets and now_on != (was := recorded.inlet.info.hostname()):
-                recorded.warn(
-                    f"was sent by {was} and came back from {now_on}: check that it is the same one"
-                )
-
-    @staticmethod
-    def _alike(recorded: _Recorded, found: "list[pylsl.StreamInfo]") -> str | None:
-        """Return the computer that sends such a stream now; None when no search finds one."""
-        was = recorded.inlet.info
-        looks = was.source_id(), _key(was)[1:]
-        alike = (one for one in found if (one.source_id(), _key(one)[1:]) == looks)
-        return next((one.hostname() for one in alike), None)
+            silent = not flow.samples or now - flow.last > 2 * FORGET_S
+            if silent and key in self._there and recorded.inlet.info.uid() not in self._since:
+                recorded.inlet.leave()
 
 
 def _key(info: "pylsl.StreamInfo") -> _Key:
@@ -323,7 +312,7 @@ def _health(recorded: _Recorded, now: float, rivals: list[str]) -> Health:
         missing=flow.missing,
         resets=flow.resets,
         misfits=[*recorded.misfits, *rivals],
-        warnings=[*recorded.warnings, *rivals],
+        warnings=[*recorded.warnings, *flow.warnings, *rivals],
         signals=list(signals.faults.values()) if signals else [],
         unwatched=signals.failed if signals else {},
         taken=recorded.taken,
