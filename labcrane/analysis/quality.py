@@ -21,6 +21,7 @@ def verdict_of_stamps(report: Mapping[str, Any]) -> str:
     if not {"presented", "interrupted"} & set(report):
         return str(report.get("verdict", ""))
     judged = [*report["streams"], *filter(None, [report["loop"]]), *report["missing"]]
+    judged += report.get("loop_back", ())
     return worst(Verdict(one["verdict"]) for one in judged).value
 
 
@@ -82,6 +83,34 @@ def sync_quality(participant: Participant) -> "pd.DataFrame":
                     "corrected": corrected,
                     "samples": len(stream.time),
                     **about,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def loop_backs(participant: Participant) -> "pd.DataFrame":
+    """Return what photodiodes and microphones showed of the streams that recorded them.
+
+    Milliseconds: delay of the sensor after the picture or sound, by how much it grew from the first
+    third of the session to the last, and the uncertainty of the stream's times at 95 %.
+    """
+    import pandas as pd
+
+    rows = []
+    for number, session in participant.sessions():
+        for one in session.sync_report.get("loop_back", ()):
+            delay = one["delay"] or {}
+            times = {"delay": "mean_s", "delay_sd": "sd_s"}
+            known = {name: delay.get(key) for name, key in times.items()}
+            known |= {"growth": one["moved_s"], "stated": one["stated_s"]}
+            rows.append(
+                {
+                    "participant": participant.name,
+                    "session": number,
+                    **{name: one[name] for name in ("stream", "channel", "of", "verdict")},
+                    "seen": delay.get("seen", 0),
+                    "changes": delay.get("asked", 0),
+                    **{f"{k}_ms": None if v is None else 1e3 * v for k, v in known.items()},
                 }
             )
     return pd.DataFrame(rows)

@@ -9,8 +9,8 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from labcrane.errors import ProtocolError
-from labcrane.feedback.delay_analysis import Delay, Kind
 from labcrane.files.atomic import SHARED_FILE, write_text
+from labcrane.streams.edges import Delay, Kind
 
 NOT_MEASURED = "not measured"
 

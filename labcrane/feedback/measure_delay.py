@@ -13,13 +13,13 @@ from labcrane.core.clock import Tick
 from labcrane.core.records import Frame, Phase, Run, SessionState
 from labcrane.errors import ProtocolError, StreamError
 from labcrane.feedback.config import FeedbackConfig
-from labcrane.feedback.delay_analysis import Change, Kind, delay, onsets, steps
 from labcrane.feedback.delays import MeasuredDelay
 from labcrane.feedback.presenter import Presenter
 from labcrane.feedback.processes import host_orders
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.registry.registry import discover
+from labcrane.streams.edges import Change, Kind, delay, onsets, steps
 from labcrane.streams.newest import NewestSample
 
 if TYPE_CHECKING:

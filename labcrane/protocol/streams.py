@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import (
+    Field,
     NonNegativeFloat,
     PositiveFloat,
     PositiveInt,
@@ -71,6 +72,11 @@ class StreamNeed(Settings):
     """Whether its sampler pauses now and then, as an eye tracker does that stores its data.
     Timestamps that are later from one sample on are then right. Otherwise they may be of a clock
     that was set, and their uncertainty includes the step."""
+
+    sees: dict[str, str] = Field(default_factory=dict)
+    """Channels of a photodiode, a microphone or an accelerometer, by label, each with the view,
+    sound or vibration at which it is: ``{Diode: operator}``. The sync report compares the times of
+    each change."""
 
     @model_validator(mode="after")
     def _names_a_stream(self) -> "StreamNeed":

@@ -223,6 +223,7 @@ class Checker:
             self._check_primary(tasks)
         self._check_names()
         self._check_own_streams()
+        self._check_sensors()
         if self._protocol.participants.ends_early:
             self._source.problem(
                 ("participants", "pattern"),
@@ -252,6 +253,24 @@ class Checker:
             )
             message = f"labcrane sends no stream {name!r}; {there}"
             self._source.problem(("streams", label, "name"), message)
+
+    def _check_sensors(self) -> None:
+        """Note sensors at a view or sound that there is not, or at a view without a patch."""
+        views = self._protocol.views
+        shown = [*self._protocol.feedback, *views]
+        for label, need in self._protocol.streams.items():
+            for channel, of in need.sees.items():
+                if of not in shown:
+                    message = (
+                        f"there is no view or feedback {of!r}; {nearest(of, shown, 'there is')}"
+                    )
+                elif of in views and "patch" not in dict(views[of]):
+                    message = (
+                        f"view {of!r} has no patch for a photodiode; write patch: {{}} under it"
+                    )
+                else:
+                    continue
+                self._source.problem(("streams", label, "sees", channel), message)
 
     def _check_blocks(self, tasks: Mapping[str, Task]) -> None:
         """Note blocks that name no task, or limit what the task does not vary."""

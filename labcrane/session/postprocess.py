@@ -9,19 +9,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane.analysis.presented import judge_interrupted, judge_presented
-from labcrane.errors import LabcraneError
+from labcrane.core.findings import Finding, Verdict
+from labcrane.errors import LabcraneError, RecordingError
 from labcrane.protocol.streams import StreamNeed, TimeLimits
 from labcrane.recording.foreign_streams import RecordedStream
 from labcrane.recording.participant_file.columns import text_of, write_attributes
-from labcrane.recording.participant_file.reader import session_in
+from labcrane.recording.participant_file.reader import SessionRecord, Stream, session_in
 from labcrane.recording.participant_file.recorrect import read_channel, read_stream
 from labcrane.recording.participant_file.session_group import write_sync_report
 from labcrane.recording.participant_file.stream_group import write_time, write_uncorrected
+from labcrane.recording.pictures import LOG
+from labcrane.streams.edges import QUIET_S, Change
 from labcrane.streams.recorder.health import counter_label
 from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.pool import pooled
 from labcrane.streams.sync.raw import RawStream, raw_of, unwrapped
 from labcrane.streams.sync.report.limits import Limits
+from labcrane.streams.sync.report.loop_back import LoopBack, judge_loop_back
 from labcrane.streams.sync.report.stream_report import (
     StreamReport,
     judge_stream,
@@ -76,7 +80,14 @@ def conclude(group: "h5py.Group", spaces: Mapping[str, str] = NO_SPACES) -> Sync
     never = () if absent else never_came(missing)
     with session_in(group) as session:
         shown = judge_presented(session), judge_interrupted(session)
-    report = SyncReport(tuple(judged), _loop(group, context, limits), never, absent, *shown)
+        looped = [
+            _loop_back(session, one, judge.quality.error_p95_s, channel, of)
+            for one, judge in zip(streams, judged, strict=True)
+            for channel, of in (one.need.sees if one.need else {}).items()
+        ]
+    report = SyncReport(
+        tuple(judged), _loop(group, context, limits), never, absent, *shown, tuple(looped)
+    )
     write_sync_report(group, report.as_json())
     return report
 
@@ -116,6 +127,46 @@ def _corrected(one: _Read, raw: RawStream, end: float | None, limits: Limits) ->
     write_time(one.group, columns_of(corrected), quality_of(corrected, treatment))
     required = one.need is None or one.need.required
     return judge_stream(one.recorded, corrected.quality, limits, required=required)
+
+
+def _loop_back(
+    session: SessionRecord, one: _Read, stated_s: float, channel: str, of: str
+) -> LoopBack:
+    """Compare a sensor's channel with what the session showed or played."""
+    names = one.recorded.header.name, channel, of
+    try:
+        stream = session.streams[one.group.name.rpartition("/")[2]]
+        signal = stream.time, np.asarray(stream.column(channel), np.float64)
+        changes, light = _changes(session, of)
+        return judge_loop_back(names, changes, signal, stated_s, light=light)
+    # A sensor must not keep a session from its file, whatever it or its stream is.
+    except Exception as error:  # noqa: BLE001
+        told = error if isinstance(error, LabcraneError) else f"{error!r}; please report this"
+        finding = replace(Finding.failed(RecordingError(str(told))), verdict=Verdict.WARN)
+        return LoopBack(*names, stated_s, Verdict.WARN, findings=(finding,))
+
+
+def _changes(session: SessionRecord, of: str) -> tuple[list[Change], bool]:
+    """Return what a view or sound logged that a sensor notices, and whether it is light."""
+    log = session.streams.get(LOG + of)
+    if log is None:
+        raise RecordingError(
+            f"what {of!r} presented was not recorded; look for its failure among the events"
+        )
+    if "patch" in log.units:
+        return _patch_changes(log), True
+    # A sound or a vibration logs only while it is there.
+    began = np.flatnonzero(np.diff(log.time, prepend=-np.inf) > QUIET_S)
+    return [Change(float(log.time[k]), up=True) for k in began], False
+
+
+def _patch_changes(log: Stream) -> list[Change]:
+    """Return when the patch of a view changed, by its log."""
+    shown = log.columns(("flip.time", "patch"))
+    known = np.isfinite(shown["patch"])
+    white, at = shown["patch"][known] > 0.0, shown["flip.time"][known]
+    changed = np.flatnonzero(white[1:] != white[:-1]) + 1
+    return [Change(float(at[k]), bool(white[k])) for k in changed]
 
 
 def _write_space(one: _Read, spaces: Mapping[str, str]) -> None:

@@ -119,6 +119,10 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
         lambda: _succeeds(*UNSHARE, "sh", "-c", "mount -t tmpfs none /mnt"),
         "allow user namespaces with mounts",
     ),
+    "clocks": (
+        lambda: _succeeds("unshare", "-r", "--time", "true"),
+        "apt install util-linux; allow user namespaces with clocks",
+    ),
     "networks": (
         lambda: _succeeds("unshare", "-rn", "true"),
         "apt install util-linux; allow user namespaces with networks",

@@ -754,3 +754,21 @@ def test_no_time_is_below_nothing(told, most: str) -> None:
     (line,) = told("aiming", text)
     assert line.startswith(column_of(text, f"{most}}}}}"))
     assert line.endswith("so that no trial is a success; it must be greater than 0 s")
+
+
+@pytest.mark.parametrize(
+    ("sees", "said"),
+    [
+        ("window", "view 'window' has no patch for a photodiode; write patch: {} under it"),
+        ("widow", "there is no view or feedback 'widow'; did you mean 'window'? there is window"),
+    ],
+)
+def test_a_sensor_is_at_a_view_with_a_patch(
+    sees: str, said: str, tmp_path: Path, registry: Registry
+) -> None:
+    path = tmp_path / "protocol.yaml"
+    seen = f"streams:\n  eeg: {{name: Amplifier, sees: {{Diode: {sees}}}}}\n"
+    path.write_text(f"{SHORT}views:\n  window: {{use: view}}\n{seen}", encoding="utf-8")
+    with pytest.raises(ProtocolError) as told:
+        load(path, registry)
+    assert str(told.value).endswith(said)

@@ -15,6 +15,7 @@ from labcrane.analysis.parallel import work
 from labcrane.analysis.quality import (
     exclusions,
     is_result,
+    loop_backs,
     loop_quality,
     sync_quality,
     without_onset,
@@ -137,7 +138,7 @@ def write_report(
     )
     page.heading("Loop and clocks")
     page.table("loop_quality", tables.loop)
-    _syncs(page, tables.sync)
+    _syncs(page, tables)
     if unprobed:
         page.say(f"Used on request, though timestamp accuracy is unknown: {'; '.join(unprobed)}.")
     page.lead(answer(cohort, everything, (tables.loop, tables.sync), about, results))
@@ -158,8 +159,8 @@ class PersonTables:
     ----------
     movements
         All trials with their measures, also those excluded from means.
-    loop, sync
-        Quality of the loop by session, and of external clocks by stream.
+    loop, sync, loop_backs
+        Quality of the loop by session, of external clocks by stream, and of both by sensors.
     answers, scores, thresholds
         Of questionnaires, and of tracks.
     drifts, unmeasured
@@ -169,6 +170,7 @@ class PersonTables:
     movements: "pd.DataFrame"
     loop: "pd.DataFrame"
     sync: "pd.DataFrame"
+    loop_backs: "pd.DataFrame"
     answers: "pd.DataFrame"
     scores: "pd.DataFrame"
     thresholds: "pd.DataFrame"
@@ -206,6 +208,7 @@ def _one(
                 movements=own,
                 loop=loop_quality(participant),
                 sync=sync_quality(participant),
+                loop_backs=loop_backs(participant),
                 answers=answers_of(participant),
                 scores=scores_of(participant),
                 thresholds=thresholds_of(participant),
@@ -549,11 +552,19 @@ def _of_model(model: MixedModel) -> Iterator[str]:
         yield f"{name} is not in the model: it cannot be distinguished from the other terms."
 
 
-def _syncs(page: Page, syncs: "pd.DataFrame") -> None:
-    if syncs.empty:
+def _syncs(page: Page, tables: PersonTables) -> None:
+    if tables.sync.empty:
         page.say("No external streams were recorded: there is one clock.")
     else:
-        page.table("sync_quality", syncs)
+        page.table("sync_quality", tables.sync)
+    page.rows(
+        "loop_back",
+        tables.loop_backs,
+        "What photodiodes and microphones recorded of pictures and sounds: the delay is that of "
+        "screen, sensor and device together, and a stream whose delay grows by more than is stated "
+        "fails.",
+        "Loop-back checks",
+    )
 
 
 def _by_which_rule(everything: "pd.DataFrame") -> str:
@@ -613,5 +624,5 @@ def _participant_page(participant: Participant, tables: PersonTables, folder: Pa
     )
     page.heading("Loop and clocks")
     page.table("loop_quality", tables.loop)
-    _syncs(page, tables.sync)
+    _syncs(page, tables)
     page.write()

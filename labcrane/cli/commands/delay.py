@@ -8,7 +8,7 @@ from labcrane.cli.output import out
 from labcrane.errors import ProtocolError
 
 if TYPE_CHECKING:
-    from labcrane.feedback.delay_analysis import Kind
+    from labcrane.streams.edges import Kind
 
 WORDS: "Mapping[Kind, str]" = {"display": "view", "audio": "sound", "touch": "vibration"}
 GUIDES: "Mapping[Kind, str]" = {

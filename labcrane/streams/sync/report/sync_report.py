@@ -5,15 +5,16 @@ It says too of which movements the operator was shown too little.
 Made at the end of a session, before the participant leaves; kept in the participant file.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from labcrane.core.findings import Finding, Verdict, worst
 from labcrane.recording.journal import finite
 from labcrane.streams.sync.report.limits import Limits
+from labcrane.streams.sync.report.loop_back import LoopBack
 from labcrane.streams.sync.report.stream_report import StreamReport
 from labcrane.types import FloatArray
 
@@ -44,6 +45,11 @@ class LoopReport:
     findings: tuple[Finding, ...] = ()
 
 
+class _Judged(Protocol):
+    @property
+    def verdict(self) -> Verdict: ...
+
+
 @dataclass(frozen=True, slots=True)
 class SyncReport:
     """All streams and the loop.
@@ -60,6 +66,8 @@ class SyncReport:
         Findings on movements of which the operator was shown too little.
     interrupted
         Findings on movements that were paused after a view or sound had failed.
+    loop_back
+        What photodiodes and microphones say of the streams that recorded them.
     """
 
     streams: tuple[StreamReport, ...]
@@ -68,6 +76,7 @@ class SyncReport:
     absent: tuple[str, ...] = ()
     presented: tuple[Finding, ...] = ()
     interrupted: tuple[Finding, ...] = ()
+    loop_back: tuple[LoopBack, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -81,15 +90,15 @@ class SyncReport:
     @property
     def of_stamps(self) -> Verdict:
         """The worst of what was found of time stamps."""
-        loop = [] if self.loop is None else [self.loop.verdict]
-        return worst(
-            [*(one.verdict for one in self.streams), *loop, *(one.verdict for one in self.missing)]
-        )
+        judged: list[Iterable[_Judged]] = [self.streams, self.missing, self.loop_back]
+        if self.loop is not None:
+            judged.append([self.loop])
+        return worst(one.verdict for each in judged for one in each)
 
     def as_json(self) -> dict[str, Any]:
         """Return what JSON can hold; what is not known is null."""
         plain = {name: finite(each) for name, each in asdict(self).items()}
-        for name in ("absent", "presented", "interrupted"):
+        for name in ("absent", "presented", "interrupted", "loop_back"):
             if not plain[name]:  # as in recordings of before
                 del plain[name]
         return {"verdict": self.verdict.value, **plain}
@@ -105,6 +114,7 @@ class SyncReport:
         if self.loop is not None:
             found += [("loop: ", finding) for finding in self.loop.findings]
         found += [("feedback: ", finding) for finding in self._of_feedback]
+        found += [(f"{one.stream}: ", each) for one in self.loop_back for each in one.findings]
         order = list(Verdict)
         found.sort(key=lambda pair: -order.index(pair[1].verdict))
         return [f"{f.verdict} {whose}{f.text}; {f.advice}" for whose, f in found]
@@ -115,7 +125,7 @@ class SyncReport:
             f"{one.name}: {'; '.join(filter(None, (one.taken, *one.corrected, one.unknown)))}"
             for one in self.streams
             if one.samples
-        ]
+        ] + [f"{one.stream}: {one.in_words()}" for one in self.loop_back]
 
 
 def judge_loop(

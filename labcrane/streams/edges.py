@@ -1,4 +1,4 @@
-"""Delay from a recorded change to light and air, from a sensor's samples.
+"""Edges in a sensor's samples, and how long after a recorded change they come.
 
 A photodiode on the view's patch sees steps up and down; a microphone hears sounds begin, and an
 accelerometer feels vibrations begin. They are found at half of the way, between two samples, so
@@ -86,14 +86,11 @@ def steps(times: FloatArray, values: FloatArray) -> list[Change]:
             f"the sensor's signal does not have two levels: most of it is between {low:g} and "
             f"{high:g}, and it wavers by {wavers:g}; put the photodiode on the square, and shade it"
         )
-    near, found = 0.2 * (high - low), []
-    bright = bool(values[0] > middle)
-    for at in range(1, len(values)):
-        # Only a signal that has come near the other level has changed: noise has not.
-        if bright != (values[at] > middle) and abs(values[at] - middle) > near:
-            bright = not bright
-            found.append(Change(_crossing(times, values, at, middle), bright))
-    return found
+    # Only a signal that has come near the other level has changed: noise has not.
+    clear = np.flatnonzero(np.abs(values - middle) > 0.2 * (high - low))
+    bright = np.r_[values[0] > middle, values[clear] > middle]
+    at = clear[bright[1:] != bright[:-1]]
+    return [Change(_crossing(times, values, k, middle), bool(values[k] > middle)) for k in at]
 
 
 def onsets(times: FloatArray, values: FloatArray) -> list[Change]:
@@ -136,28 +133,37 @@ def delay(changes: Sequence[Change], seen: Sequence[Change], sensor_hz: float) -
     DeviceError
         Too many changes have no edge.
     """
-    found = []
-    ends = [change.time for change in changes[1:]] + [np.inf]
-    for change, end in zip(changes, ends, strict=True):
-        edges = [
-            edge.time - change.time
-            for edge in seen
-            if edge.up == change.up and change.time - EARLY_S <= edge.time < end - EARLY_S
-        ]
-        if edges:
-            found.append(edges[0])
-    if not changes or len(found) < FEWEST * len(changes):
+    late = np.full(len(changes), np.nan)
+    ends = np.r_[[change.time for change in changes[1:]], np.inf]
+    for up in (True, False):
+        edges = np.array([edge.time for edge in seen if edge.up == up])
+        for k, change in enumerate(changes):
+            at = int(np.searchsorted(edges, change.time - EARLY_S))
+            if change.up == up and at < len(edges) and edges[at] < ends[k] - EARLY_S:
+                late[k] = edges[at] - change.time
+    return in_short(late, sensor_hz)
+
+
+def in_short(late: FloatArray, sensor_hz: float) -> Delay:
+    """Return delays in short; NaN is a change that the sensor did not see.
+
+    Raises
+    ------
+    DeviceError
+        These are too many.
+    """
+    found = late[np.isfinite(late)]
+    if not len(found) or len(found) < FEWEST * len(late):
         raise DeviceError(
-            f"the sensor saw {len(found)} of {len(changes)} changes; put it where they are, and "
+            f"the sensor saw {len(found)} of {len(late)} changes; put it where they are, and "
             "keep other light and sound away"
         )
-    spread = float(np.std(found, ddof=1)) if len(found) > 1 else 0.0
     return Delay(
-        mean_s=float(np.mean(found)),
-        sd_s=spread,
-        least_s=min(found),
-        most_s=max(found),
+        mean_s=float(found.mean()),
+        sd_s=float(found.std(ddof=1)) if len(found) > 1 else 0.0,
+        least_s=float(found.min()),
+        most_s=float(found.max()),
         seen=len(found),
-        asked=len(changes),
+        asked=len(late),
         sensor_hz=sensor_hz,
     )

@@ -1,0 +1,164 @@
+"""Loop-back check: a stream's times beside the session's own pictures and sounds.
+
+A photodiode on a view's patch, or a microphone at the loudspeaker, goes into a channel of a
+recorded stream. Each change that the view or sound logged is in that channel, too, and always
+equally late. It is the only check of a stream's times that includes the device itself.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from labcrane.core.findings import Finding, Verdict
+from labcrane.errors import DeviceError
+from labcrane.streams.edges import EARLY_S, Change, Delay, in_short, onsets, steps
+from labcrane.types import FloatArray
+
+BEFORE_S, AFTER_S = 0.15, 0.45
+"""What is looked at about a change: longer than screens and sound devices are late."""
+
+PARTS = 3
+"""The first third of the session is compared with the last."""
+
+FEWEST = 4
+"""Changes in a third for its mean to have a standard error."""
+
+TWO_SIDED = 1.96
+"""Standard errors at 95 %, as uncertainties of times are stated."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoopBack:
+    """How late a sensor's channel is. Times are seconds; NaN where it is not known.
+
+    Attributes
+    ----------
+    stream, channel, of
+        The channel, and the view or sound that it sees or hears.
+    stated_s
+        Uncertainty of the stream's times at 95 %.
+    delay
+        From each change, as logged, to the sensor; None where too few were seen.
+    moved_s, noise_s
+        By how much the delay of the last third is longer than that of the first, and the
+        uncertainty of this difference at 95 % from its scatter.
+    """
+
+    stream: str
+    channel: str
+    of: str
+    stated_s: float
+    verdict: Verdict
+    delay: Delay | None = None
+    moved_s: float = float("nan")
+    noise_s: float = float("nan")
+    findings: tuple[Finding, ...] = ()
+
+    def in_words(self) -> str:
+        """Return what was measured, in a sentence without its end."""
+        if self.delay is None:
+            return f"{self.channel} does not show {self.of}"
+        late = self.delay
+        moved = (
+            f"; from the first third to the last it moves by {1e3 * self.moved_s:+.2f} ms"
+            if np.isfinite(self.moved_s)
+            else ""
+        )
+        return (
+            f"{self.channel} shows {late.seen} of {late.asked} changes of {self.of}, "
+            f"{1e3 * late.mean_s:.2f} ms later on average (SD {1e3 * late.sd_s:.2f} ms){moved}"
+        )
+
+
+def judge_loop_back(
+    names: tuple[str, str, str],
+    changes: Sequence[Change],
+    signal: tuple[FloatArray, FloatArray],
+    stated_s: float,
+    *,
+    light: bool,
+) -> LoopBack:
+    """Compare a channel with the changes that it was to see or hear.
+
+    A steady delay is that of screen and sensor, and passes. It fails if the delay moves by more
+    than the stated uncertainty of two times, or if the sensor is earlier than the change.
+
+    Parameters
+    ----------
+    names
+        Stream, channel, and the view or sound.
+    changes
+        As the view or sound logged them.
+    signal
+        Times on our clock, and values, both of shape ``(n,)``.
+    stated_s
+        Uncertainty of the times at 95 %.
+    light
+        Whether it is a photodiode; otherwise it hears or feels.
+    """
+    times, values = signal
+    late = np.array(
+        [_late(one, after, times, values, light=light) for one, after in _spans(changes)]
+    )
+    sensor_hz = (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else float("nan")
+    try:
+        found = in_short(late, sensor_hz)
+    except DeviceError as error:
+        return LoopBack(*names, stated_s, Verdict.FAIL, findings=(Finding.failed(error),))
+    at = np.flatnonzero(np.isfinite(late))
+    first, last = late[at[: len(at) // PARTS]], late[at[len(at) - len(at) // PARTS :]]
+    moved = noise = float("nan")
+    findings = []
+    if len(first) >= FEWEST:
+        moved = float(last.mean() - first.mean())
+        spread = np.var(first, ddof=1) / len(first) + np.var(last, ddof=1) / len(last)
+        noise = TWO_SIDED * float(np.sqrt(spread))
+        if abs(moved) > 2.0 * stated_s + noise:
+            findings.append(
+                Finding(
+                    Verdict.FAIL,
+                    f"the delay from {names[2]} to {names[1]} grows by {1e3 * moved:+.2f} ms from "
+                    "the first third of the session to the last, and times are stated within "
+                    f"{1e3 * stated_s:.2f} ms",
+                    "do not use this stream's times at that accuracy; ask the maker how its "
+                    "samples are stamped",
+                )
+            )
+    early = float(np.quantile(late[at], 0.05))
+    if early < -(stated_s + 1.0 / sensor_hz):
+        findings.append(
+            Finding(
+                Verdict.FAIL,
+                f"{names[1]} shows {names[2]} {-1e3 * early:.2f} ms before it changed",
+                "correct latency_s of the stream, and check which view or sound the sensor is at",
+            )
+        )
+    verdict = Verdict.FAIL if findings else Verdict.PASS
+    return LoopBack(*names, stated_s, verdict, found, moved, noise, tuple(findings))
+
+
+def _spans(changes: Sequence[Change]) -> list[tuple[Change, float]]:
+    """Return each change, and when the next one is."""
+    return list(zip(changes, [*(one.time for one in changes[1:]), np.inf], strict=True))
+
+
+def _late(
+    change: Change, after: float, times: FloatArray, values: FloatArray, *, light: bool
+) -> float:
+    """Return how long after a change the first edge is near it; NaN without one.
+
+    Whether the signal rises or falls is not asked: amplifiers have either sign.
+    """
+    first, end = np.searchsorted(
+        times, (change.time - BEFORE_S, min(change.time + AFTER_S, after - EARLY_S))
+    )
+    near, level = times[first:end], values[first:end]
+    if len(near) < 2 or not np.isfinite(level).all():  # noqa: PLR2004
+        return float("nan")
+    try:
+        edges = steps(near, level) if light else onsets(near, level)
+    except DeviceError:
+        return float("nan")
+    late = (edge.time - change.time for edge in edges if edge.time >= change.time - EARLY_S)
+    return next(late, float("nan"))
