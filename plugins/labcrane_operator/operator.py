@@ -6,9 +6,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from labcrane import FloatArray, Frame, InputDevice, Run, Signal, Tick, Trial
-from labcrane.core import Kernel, Layout, Phase, Places, Value
+from labcrane.core import Kernel, Layout, Phase, Places, Value, compiled
+from labcrane_operator import law
 from labcrane_operator.aimer import STILL, Aimer
-from labcrane_operator.noise import BLOCK, Noise
+from labcrane_operator.noise import Noise
 from labcrane_operator.settings import CONNECTED, STICK, OperatorSettings
 
 RUNNING = Phase.RUNNING  # Python 3.11 takes long to find it there in every tick; 3.12 does not
@@ -64,8 +65,7 @@ class SimulatedOperator(InputDevice):
     def begin_trial(self, trial: Trial) -> None:
         settings, dt = self._settings, 1.0 / self._run.rate_hz
         gain = settings.learning_gain * math.exp(-settings.learning_rate * (trial.number - 1))
-        noise = Noise(trial.seed, math.exp(-dt / settings.motor_noise_s))
-        self._aimer = Aimer(settings, noise, self._pace * (1.0 + gain), dt)
+        self._aimer = Aimer(settings, Noise(trial.seed), self._pace * (1.0 + gain), dt)
         self._trial = trial.number
 
     def read(self, tick: Tick, seen: Frame) -> FloatArray:
@@ -94,16 +94,15 @@ class SimulatedOperator(InputDevice):
         return {"simulated": True, "pace": self._pace}
 
     def kernel(self) -> Kernel | None:
-        from labcrane_operator.compiled import CHANGING, DRAWN, hands  # noqa: PLC0415 - loads numba
-
         if not self._shown:
             return None
-        own = np.zeros(DRAWN + 3 * BLOCK)
-        own[29:36] = (
+        own = np.zeros(law.DRAWN + 3 * law.BLOCK)
+        own[law.LEFT_ON : law.ASKED] = (
             self._left, self._right, self._trigger, self._tip.start, self._velocity.start,
             self._target.start, self._radius,
         )  # fmt: skip
-        return Kernel(hands, own, CHANGING, self._take_over, self._hand_back)
+        hands = compiled.also(law.hands, compiled.signatures().read)
+        return Kernel(hands, own, law.CHANGING, self._take_over, self._hand_back)
 
     def _take_over(self, own: FloatArray, seen: Frame) -> bool:
         aimer = self._aimer
@@ -111,14 +110,14 @@ class SimulatedOperator(InputDevice):
             return False
         if not aimer.is_at(tuple(seen.task[self._target].tolist())):
             return False  # it turns to a target, or rests without one
-        own[:19], own[19:29] = aimer.numbers(), aimer.constants()
-        drawn = aimer.drawn
-        own[39 : 39 + 3 * len(drawn)] = np.ravel(drawn)
+        drawn = law.DRAWN + 3 * int(aimer.own[law.LEFT])
+        own[: law.LEFT_ON] = aimer.own[: law.LEFT_ON]
+        own[law.DRAWN : drawn] = aimer.own[law.DRAWN : drawn]
         return True
 
     def _hand_back(self, own: FloatArray, rows: FloatArray, places: Places) -> None:
         if self._aimer is not None:
-            self._aimer.go_on(own[:8].tolist())
+            self._aimer.own[: law.CHANGING] = own[: law.CHANGING].tolist()
 
     def _sees(self, seen: Frame) -> bool:
         """Say whether the frame shows this trial, going on."""

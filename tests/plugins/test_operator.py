@@ -15,11 +15,10 @@ from labcrane.machines import ACTUATOR_PRESETS
 from labcrane.machines.library import load_machine
 from labcrane.protocol.questions import questions
 from labcrane.testing import RATE_HZ, InputContract, ch8
-from labcrane_operator import labcrane_inputs
+from labcrane_operator import labcrane_inputs, law
 from labcrane_operator.aimer import Aimer
 from labcrane_operator.noise import Noise
 from labcrane_operator.settings import OperatorSettings
-from labcrane_operator.sub_movement import SubMovement
 
 PRACTISED = {"learning_gain": 0.0}
 STEADY = PRACTISED | {
@@ -91,19 +90,21 @@ def test_hands_on_a_keyboard_move_as_those_on_two_joysticks(tmp_path: Path, end:
 
 
 def test_a_sub_movement_is_the_one_of_least_jerk() -> None:
-    plan = SubMovement((1.0, 2.0, 0.0), (3.0, 2.0, -1.0), 4.0)
-    way = np.array([2.0, 0.0, -1.0])
+    settings = OperatorSettings(motor_noise=0.0, gain_per_s=1.0)
+    own, way = Aimer(settings, Noise(1), 1.0, dt=0.4).own, np.array([2.0, 0.0, -1.0])
+    own[law.PLANNED : law.DT] = (1.0, 4.0, 1.0, 2.0, 0.0, *way, 3.0, 2.0, -1.0)
+    own[law.DOING], own[law.LEFT], own[law.STILL2] = law.MOVING, 12.0, 0.0
     for u in np.linspace(0, 1, 11):
-        position, velocity = plan.at(4.0 * u)
-        share = 10 * u**3 - 15 * u**4 + 6 * u**5
-        pace = (30 * u**2 - 60 * u**3 + 30 * u**4) / 4.0
-        np.testing.assert_allclose(position, [1, 2, 0] + share * way, atol=1e-14)
-        np.testing.assert_allclose(velocity, pace * way, atol=1e-14)
-    assert plan.at(5.0) == ((3.0, 2.0, -1.0), (0.0, 0.0, 0.0))
+        position = [1, 2, 0] + (10 * u**3 - 15 * u**4 + 6 * u**5) * way
+        velocity = (30 * u**2 - 60 * u**3 + 30 * u**4) / 4.0 * way
+        assert law.follow(own, *position) == law.GOES
+        np.testing.assert_allclose(own[law.ASKED : law.DRAWN], velocity, atol=1e-13)
+    assert law.follow(own, 3.0, 2.0, -1.0) == law.GOES
+    assert own[law.ASKED : law.DRAWN] == [0.0, 0.0, 0.0]
 
 
 def test_scatter_grows_with_distance_and_is_half_as_wide_to_the_sides() -> None:
-    noise = Noise(1, 0.9)
+    noise = Noise(1)
     for length in (1.0, 5.0):
         points = np.array([noise.scatter((0, 0, 0), (length, 0, 0), 0.1) for _ in range(4000)])
         np.testing.assert_allclose(points.mean(axis=0), [length, 0, 0], atol=0.01 * length)
@@ -112,15 +113,21 @@ def test_scatter_grows_with_distance_and_is_half_as_wide_to_the_sides() -> None:
 
 
 def test_motor_noise_has_unit_variance_and_the_correlation_asked_for() -> None:
-    noise = Noise(2, 0.8)
-    values = np.array([noise.motor() for _ in range(40_000)])[100:]
+    aimer = Aimer(OperatorSettings(motor_noise_s=1.0), Noise(2), 1.0, dt=-math.log(0.8))
+    values = []
+    for _ in range(40_000):
+        aimer.move((0.0, 0.0, 0.0), 1.0, (1.0, 0.0, 0.0), 0.25)
+        values.append(aimer.own[law.NOISE : law.LEFT])
+    drawn = np.unique(values, axis=0, return_index=True)[1]  # while the hands rest, none is drawn
+    values = np.array(values)[np.sort(drawn)][100:]
+    assert len(values) > 20_000
     np.testing.assert_allclose(values.std(axis=0), 1.0, rtol=0.05)
     for axis in values.T:
         assert np.corrcoef(axis[1:], axis[:-1])[0, 1] == pytest.approx(0.8, abs=0.02)
 
 
 def test_reaction_times_are_lognormal_around_their_median() -> None:
-    logs = np.log([Noise(seed, 0.9).reaction(0.35, 0.2) for seed in range(2000)])
+    logs = np.log([Noise(seed).reaction(0.35, 0.2) for seed in range(2000)])
     assert math.exp(np.median(logs)) == pytest.approx(0.35, rel=0.02)
     assert logs.std() == pytest.approx(0.2, rel=0.06)
 
@@ -300,7 +307,7 @@ def test_what_the_last_trial_left_on_view_is_not_aimed_at() -> None:
 
 def test_a_target_that_moves_is_reacted_to_anew() -> None:
     settings = OperatorSettings(reaction_s=0.1, reaction_sd=0.0)
-    aimer = Aimer(settings, Noise(1, 0.9), 1.0, 0.01)
+    aimer = Aimer(settings, Noise(1), 1.0, 0.01)
     tip = (0.0, 0.0, 0.0)
     first = [aimer.move(tip, 0.0, (1.0, 0.0, 0.0), 0.25) for _ in range(50)]
     assert first[8] == (0.0, 0.0, 0.0)
