@@ -1,7 +1,8 @@
 """Compiler of kernels: numba, with the one calling convention of each role.
 
 Numba is an extra and loads for a second: it is loaded when the first function is compiled, so
-import a module with compiled functions in :meth:`labcrane.Component.kernel` and nowhere else.
+compile in :meth:`labcrane.Component.kernel` and nowhere else. What is compiled runs in Python, too:
+a component calls the functions of its law as they are, and its kernel is made of the same.
 Arithmetic is Python's, operation by operation: nothing is reordered or fused, and a root, a sine or
 a cube root is the C library's, as Python's is. ``math.hypot`` and ``math.dist`` are not: Python
 3.12 rounds differently from 3.11. Write the root of a sum of squares, here and in the component.
@@ -57,11 +58,6 @@ def signatures() -> Signatures:
     )
 
 
-def part(function: F) -> F:
-    """Compile a function that others in the same module call."""
-    return compile_function(function)
-
-
 @cache
 def also(function: F, signature: Any = None) -> F:
     """Compile a function that Python runs as well, and those of its module that it calls.
@@ -87,12 +83,14 @@ def tick(function: F) -> F:
 
     ``function(own, places, seen, row)``: all of float64, but ``places`` of int64.
     """
-    return compile_function(function, signatures().tick)
+    compiled: F = also(function, signatures().tick)
+    return compiled
 
 
 def inverse(function: F) -> F:
     """Compile the inverse of a controller: ``function(own, places, velocity, seen, row)``."""
-    return compile_function(function, signatures().inverse)
+    compiled: F = also(function, signatures().inverse)
+    return compiled
 
 
 def read(function: F) -> F:
@@ -101,16 +99,8 @@ def read(function: F) -> F:
     ``function(own, places, seen, row, inverse, theirs)``: the last two are the controller's inverse
     and the array of its kernel, to be called as ``inverse(theirs, places, velocity, seen, row)``.
     """
-    return compile_function(function, signatures().read)
-
-
-def as_signed(signature: Any) -> Callable[[F], F]:
-    """Return a decorator that compiles a function of this signature."""
-
-    def compile_it(function: F) -> F:
-        return compile_function(function, signature)
-
-    return compile_it
+    compiled: F = also(function, signatures().read)
+    return compiled
 
 
 def compile_function(function: F, signature: Any = None) -> F:

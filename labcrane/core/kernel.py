@@ -51,7 +51,7 @@ class Kernel:
     Attributes
     ----------
     tick
-        Compiled by the decorator of the component's role in :mod:`labcrane.core.compiled`. It is
+        Compiled by the function of the component's role in :mod:`labcrane.core.compiled`. It is
         given ``own``, ``places``, the row of the frame before and the row under way, into which it
         writes its part; it returns :data:`MADE` or :data:`DECLINED`. Its changes in a tick that
         any kernel declines are undone.

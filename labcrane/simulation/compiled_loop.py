@@ -8,7 +8,7 @@ import numpy as np
 from numba import types
 from numba.extending import typeof_impl
 
-from labcrane.core.compiled import as_signed, compile_function, signatures
+from labcrane.core.compiled import compile_function, signatures
 from labcrane.core.kernel import AXES, MADE, TASK, Places
 from labcrane.types import FloatArray
 
@@ -52,8 +52,7 @@ def addresses(read: Any, inverse: Any, *ticks: Any) -> tuple[Address, ...]:
     return (Address(read, _OF.read), Address(inverse, _OF.inverse), *others)
 
 
-@as_signed(_SIGNATURE)
-def advance(
+def _advance(
     rows: FloatArray, seen: FloatArray, places: Places, about: FloatArray, kept: FloatArray,
     first: int,
     read: Any, hands: FloatArray, inverse: Any, command: Any, scheme: FloatArray,
@@ -106,6 +105,9 @@ def advance(
         seen = row
         made += 1
     return made
+
+
+advance = compile_function(_advance, _SIGNATURE)
 
 
 @compile_function

@@ -6,8 +6,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from labcrane import Frame, Machine, ProtocolError, Run, Signal, Task, Trial
-from labcrane.core import Event, Kernel, Phase, PlannedTrial, TrialStatus, kernel
+from labcrane.core import Event, Kernel, Phase, PlannedTrial, TrialStatus, compiled, kernel
 from labcrane.machines import reach
+from labcrane_aiming import law
 from labcrane_aiming.pairs import Pair, Point, index_of_difficulty, pairs
 from labcrane_aiming.settings import AimingSettings
 
@@ -19,8 +20,6 @@ if TYPE_CHECKING:  # a protocol is checked without loading numpy
 PLAN_INTERCEPT_S = 1.0
 PLAN_SLOPE_S = 3.2
 
-PRESSED = 0.5  # a button is 0 or 1
-END_RULES = ("rest_inside", "rest_anywhere", "trigger")  # by their numbers in the compiled kernel
 RUNNING = Phase.RUNNING  # Python 3.11 takes long to find it there in every tick; 3.12 does not
 
 
@@ -228,29 +227,27 @@ class Aiming(Task):
     def kernel(self) -> Kernel:
         import numpy as np  # noqa: PLC0415 - as in open
 
-        from labcrane_aiming.compiled import CHANGING, SHOWN, evaluate  # noqa: PLC0415 - loads numba
-
-        own = np.zeros(SHOWN + 7)
-        return Kernel(evaluate, own, CHANGING, self._take_over, self._hand_back)
+        own = np.zeros(law.SHOWN + 7)
+        tick = compiled.tick(law.evaluate)
+        return Kernel(tick, own, law.CHANGING, self._take_over, self._hand_back)
 
     def _take_over(self, own: "FloatArray", seen: Frame) -> bool:
-        from labcrane_aiming.compiled import SHOWN  # noqa: PLC0415 - loads numba
         from labcrane_aiming.movement import ROUNDING_S  # noqa: PLC0415 - loads numpy
 
         settings, movement, command = self._settings, self._movement, self._command
         if not movement.ticks:
             return False
-        own[:SHOWN] = (
+        own[: law.SHOWN] = (
             movement.rest_since, movement.inside, movement.entries, self._pressed,
             movement.fast_since, movement.hands_off, movement.begun,
             not math.isnan(movement.command_onset), not math.isnan(movement.reaction_time),
             settings.rest_speed, settings.rest_s - ROUNDING_S, self._limit, settings.width / 2,
-            END_RULES.index(settings.end), self._trigger or 0, settings.rest_after,
+            law.END_RULES.index(settings.end), self._trigger or 0, settings.rest_after,
             self._tip.start, self._velocity.start, command.start, command.stop,
             settings.onset_speed, settings.onset_hold_s - ROUNDING_S, movement.elapsed[0],
             movement.distance[0],
         )  # fmt: skip
-        own[SHOWN:] = self._values
+        own[law.SHOWN :] = self._values
         return True
 
     def _hand_back(self, own: "FloatArray", rows: "FloatArray", places: "Places") -> None:
@@ -289,7 +286,7 @@ class Aiming(Task):
     def _phase(self, frame: Frame, events: list[Event]) -> tuple[Phase, int | None]:
         movement = self._movement
         if self._trigger is not None:
-            pressed = bool(frame.axes[self._trigger] > PRESSED)
+            pressed = bool(frame.axes[self._trigger] > law.PRESS)
             edge, self._pressed = pressed and not self._pressed, pressed
             if edge and self._is_tap(frame.elapsed):
                 return Phase.SUCCESS, movement.ticks - 1

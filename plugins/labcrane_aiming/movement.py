@@ -10,6 +10,7 @@ import numpy as np
 
 from labcrane import FloatArray
 from labcrane.core import Value
+from labcrane_aiming import law
 from labcrane_aiming.pairs import Point
 from labcrane_aiming.settings import AimingSettings
 
@@ -73,18 +74,13 @@ class AimedMovement:
     ) -> None:
         """Take one tick."""
         settings = self.settings
-        vx, vy, vz = velocity
-        speed = math.sqrt(vx * vx + vy * vy + vz * vz)
-        ex, ey, ez = (at - to for at, to in zip(tip, self.target, strict=True))
-        # A root of squares, not dist: that rounds otherwise since Python 3.12.
-        distance = math.sqrt(ex * ex + ey * ey + ez * ez)
+        (x, y, z), (tx, ty, tz) = tip, self.target
+        speed, distance = law.size(*velocity), law.size(x - tx, y - ty, z - tz)
         inside = distance <= settings.width / 2
         self.entered = inside and not self.inside
         self.inside = inside
-        if speed >= settings.rest_speed or not (inside or settings.end != "rest_inside"):
-            self.rest_since = math.nan
-        elif math.isnan(self.rest_since):
-            self.rest_since = elapsed
+        rests = speed < settings.rest_speed and (inside or settings.end != "rest_inside")
+        self.rest_since = law.since(self.rest_since, elapsed, rests)
         self.ticks += 1
         self.elapsed.append(elapsed)
         self.due.append(due)
@@ -95,24 +91,12 @@ class AimedMovement:
             self._look_for_onset(elapsed, speed, distance)
 
     def _look_for_onset(self, elapsed: float, speed: float, distance: float) -> None:
-        """Take one tick more into account; the compiled kernel does the same.
-
-        The onset is the first tick of the first stretch in which the tip is faster than the onset
-        speed for long enough, however fast it becomes later. What was fast already when the trial
-        began may be how the movement before runs out: that has begun once it has come nearer to the
-        target by the circle's radius.
-        """
+        """Take one tick more into account."""
         settings = self.settings
-        if not speed > settings.onset_speed:
-            self.fast_since = math.nan
-            return
-        if math.isnan(self.fast_since):
-            self.fast_since = elapsed
-        if self.fast_since == self.elapsed[0]:
-            held = self.distance[0] - distance >= settings.width / 2
-        else:
-            held = elapsed - self.fast_since >= settings.onset_hold_s - ROUNDING_S
-        if held:
+        self.fast_since = law.since(self.fast_since, elapsed, speed > settings.onset_speed)
+        hold, half = settings.onset_hold_s - ROUNDING_S, settings.width / 2
+        nearer = self.distance[0] - distance
+        if law.begins(self.fast_since, elapsed, hold, self.elapsed[0], nearer, half):
             self.onset = self.fast_since
 
     def command(self, elapsed: float, *, given: bool) -> None:
@@ -158,9 +142,7 @@ class AimedMovement:
     @property
     def done(self) -> float:
         """Fraction of the way from circle to circle that the tip has made along the task axis."""
-        axis = np.subtract(self.target, self.start)
-        way = np.subtract(self.position[-3:], self.start)
-        return float(way @ axis / (axis @ axis))
+        return law.done(self.position[-3:], self.target, self.start)
 
     @property
     def begun(self) -> bool:

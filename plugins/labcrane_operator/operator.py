@@ -101,7 +101,7 @@ class SimulatedOperator(InputDevice):
             self._left, self._right, self._trigger, self._tip.start, self._velocity.start,
             self._target.start, self._radius,
         )  # fmt: skip
-        hands = compiled.also(law.hands, compiled.signatures().read)
+        hands = compiled.read(law.hands)
         return Kernel(hands, own, law.CHANGING, self._take_over, self._hand_back)
 
     def _take_over(self, own: FloatArray, seen: Frame) -> bool:

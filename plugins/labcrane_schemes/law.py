@@ -111,13 +111,8 @@ def kernel_of(first: list[float], second: Sequence[float] = ()) -> Kernel:
     """Return the kernel of a scheme: of one law, or of two and a button."""
     head = [0.0] * HEAD
     head[FIRST], head[SECOND] = HEAD, HEAD + len(first)
-    conventions = compiled.signatures()
-    return Kernel(
-        compiled.also(tick, conventions.tick),
-        np.array([*head, *first, *second]),
-        changing=0,
-        inverse=compiled.also(inverse, conventions.inverse),
-    )
+    numbers = np.array([*head, *first, *second])
+    return Kernel(compiled.tick(tick), numbers, changing=0, inverse=compiled.inverse(inverse))
 
 
 def table(own: Numbers, at: int, which: int) -> int:

@@ -2,18 +2,20 @@
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from labcrane.core import compiled
+from labcrane.core.cranes import law
 from labcrane.core.cranes.crane_settings import CraneSettings
+from labcrane.core.cranes.crane_state import CraneState
 from labcrane.core.kernel import STATE, Kernel, Places
 from labcrane.core.records import Frame, Run, Value
 from labcrane.core.roles import Dynamics
 from labcrane.core.signals import Signal
 from labcrane.errors import PluginError, ProtocolError
 from labcrane.machines.actuator import Actuator
-from labcrane.machines.crane_state import CraneState
 from labcrane.machines.links import link_boxes
 from labcrane.machines.machine import Body, Machine
 from labcrane.types import FloatArray
@@ -116,9 +118,7 @@ class Crane(Dynamics):
 
         Its :meth:`_stand` and :meth:`_motion` set and return its state for the kernel.
         """
-        from labcrane.core.cranes.compiled_crane import step  # noqa: PLC0415 - loads numba
-
-        return self._kernel_of(step)
+        return self._kernel_of(law.step)
 
     def engine_kernel(self) -> Kernel | None:
         """Return the kernel of a crane in an engine, for ticks in which all drives have the torque.
@@ -129,14 +129,12 @@ class Crane(Dynamics):
         slew, *_ = joints = self._machine.joints
         if slew.a or any(joint.inertia_kgm2 or joint.centre_m for joint in joints):
             return None
-        from labcrane.core.cranes.compiled_crane import links_of, step_engine  # noqa: PLC0415 - loads numba
-
-        return self._kernel_of(step_engine, links_of(self._machine), ENGINE_DEVIATION)
+        return self._kernel_of(law.step_engine, law.links_of(self._machine), ENGINE_DEVIATION)
 
     def _kernel_of(
-        self, step: object, further: Sequence[float] = (), deviation: float = 0.0
+        self, step: Callable[..., int], further: Sequence[float] = (), deviation: float = 0.0
     ) -> Kernel:
-        """Return the kernel for a compiled ``step``.
+        """Return the kernel for a ``step``.
 
         It is given the numbers of the machine and of its actuator, ``further`` ones, then angles,
         speeds, the actuator's speeds and pending commands, which it keeps up to date.
@@ -151,7 +149,14 @@ class Crane(Dynamics):
         lengths, offsets = zip(*((joint.a, joint.offset) for joint in joints), strict=True)
         moving = [0.0] * (len(joints) * (3 + actuator.delay))
         own = np.array([*head, *most, *low, *high, *lengths, *offsets, *further, *moving])
-        return Kernel(step, own, len(own), self._take_over, self._hand_back, deviation=deviation)
+        return Kernel(
+            compiled.tick(step),
+            own,
+            len(own),
+            self._take_over,
+            self._hand_back,
+            deviation=deviation,
+        )
 
     def _take_over(self, own: FloatArray, seen: Frame) -> bool:
         angles, speeds = self._motion()

@@ -1,17 +1,21 @@
-"""Compiled cranes: the actuator, the velocity law and the tip, tick by tick; it loads numba.
+"""Law of a crane: the actuator, the velocity law and the tip, tick by tick.
 
+:mod:`labcrane.core.compiled` compiles the functions for a simulation; the tip's is Python's too.
 With an engine, the law holds while every motor has the torque for it and no joint is near a limit;
 all other ticks are the engine's.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane.core import compiled, kernel
+from labcrane.core import kernel
 from labcrane.core.kernel import Places
 from labcrane.machines.machine import GRAVITY, Machine
 from labcrane.types import FloatArray
+
+Numbers = Sequence[float] | FloatArray
 
 JOINTS, DELAY, DT, BASE_X, HEIGHT, DRIVE, CHANGES, IDEAL, SHARE = range(9)
 """Joints, ticks of dead time, length of a tick, the foot, the first command and where what changes
@@ -21,7 +25,6 @@ TABLES = 10
 comes behind them: angles, speeds, the actuator's speeds and commands on their way."""
 
 
-@compiled.part
 def follow(own: FloatArray, at: int, command: FloatArray, speeds: FloatArray) -> None:
     """Fill the speeds that come of a command."""
     n, delay = len(speeds), int(own[DELAY])
@@ -42,34 +45,56 @@ def follow(own: FloatArray, at: int, command: FloatArray, speeds: FloatArray) ->
         own[last : last + n] = command
 
 
-@compiled.part
-def put_tip(own: FloatArray, angles: FloatArray, speeds: FloatArray, tip: FloatArray) -> None:
-    """Fill the tip's position and velocity."""
-    n = len(angles)
-    length, offset = TABLES + 3 * n, TABLES + 4 * n
+def tip_motion(
+    angles: Numbers, speeds: Numbers, lengths: Numbers, offsets: Numbers, foot: float,
+    base_x: float, height: float, bearing: float,
+) -> tuple[float, float, float, float, float, float]:  # fmt: skip
+    """Return the tip's position in m and velocity in m/s.
+
+    Parameters
+    ----------
+    angles, speeds
+        Of all joints, in rad and rad/s.
+    lengths, offsets
+        Of the links that pitch, in m and rad.
+    foot, base_x, height
+        Where the first pitch axis is, from the slew axis, that in the base, and above it, in m; the
+        first may be before the second.
+    bearing
+        Where the arm points, in rad.
+    """
     pitch = turning = outward = upward = 0.0
-    radius = own[length]  # the first pitch axis may be before the slew axis
-    height = own[HEIGHT]
-    for j in range(1, n):
-        pitch += angles[j] + own[offset + j]
-        turning += speeds[j]
-        forward, down = own[length + j] * math.cos(pitch), own[length + j] * math.sin(pitch)
+    radius = foot
+    for angle, speed, length, offset in zip(angles[1:], speeds[1:], lengths, offsets):  # noqa: B905 - numba
+        pitch += angle + offset
+        turning += speed
+        forward, down = length * math.cos(pitch), length * math.sin(pitch)
         radius += forward
         height -= down
         outward -= down * turning
         upward -= forward * turning
-    bearing = angles[0] + own[offset]
     ahead, left = math.cos(bearing), math.sin(bearing)
     sideways = radius * speeds[0]
-    tip[0] = own[BASE_X] + radius * ahead
-    tip[1] = radius * left
-    tip[2] = height
-    tip[3] = outward * ahead - sideways * left
-    tip[4] = outward * left + sideways * ahead
-    tip[5] = upward
+    return (
+        base_x + radius * ahead,
+        radius * left,
+        height,
+        outward * ahead - sideways * left,
+        outward * left + sideways * ahead,
+        upward,
+    )
 
 
-@compiled.tick
+def put_tip(own: FloatArray, angles: FloatArray, speeds: FloatArray, tip: FloatArray) -> None:
+    """Fill the tip's position and velocity."""
+    n = len(angles)
+    length, offset = TABLES + 3 * n, TABLES + 4 * n
+    tip[0], tip[1], tip[2], tip[3], tip[4], tip[5] = tip_motion(
+        angles, speeds, own[length + 1 : offset], own[offset + 1 : offset + n],
+        own[length], own[BASE_X], own[HEIGHT], angles[0] + own[offset],
+    )  # fmt: skip
+
+
 def step(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> int:
     """Move the crane for a tick."""
     n, at, dt = int(own[JOINTS]), int(own[CHANGES]), own[DT]
@@ -96,7 +121,6 @@ ENOUGH = 0.999
 """Share of a motor's torque up to which rounding cannot tell otherwise."""
 
 
-@compiled.part
 def torques_suffice(
     own: FloatArray, angles: FloatArray, speeds: FloatArray, asked: FloatArray, loads: FloatArray
 ) -> bool:
@@ -147,7 +171,6 @@ def torques_suffice(
     return bool(abs(loads[0]) <= ENOUGH)
 
 
-@compiled.tick
 def step_engine(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> int:
     """Move the engine's crane for a tick, if its motors can."""
     n, at, dt = int(own[JOINTS]), int(own[CHANGES]), own[DT]
