@@ -41,6 +41,8 @@ class Study:
         What is operated, and its file's content.
     input, operator, scheme, dynamics
         The components chosen; ``operator`` takes the place of ``input`` in a simulation.
+    choices
+        All components but the operator, by the part they play: ``scheme``, ``tasks.NAME``.
     tasks
         The tasks by the protocol's names for them, built.
     questionnaires
@@ -50,8 +52,6 @@ class Study:
         on block by block, views are always there.
     monitors
         Monitors of the signals of streams; None for all that are installed.
-    others
-        Components of roles that have no place of their own here, by the part they play.
     call_monitor
         Watches over all components that are built.
     recorded
@@ -75,6 +75,7 @@ class Study:
     operator: ComponentSpec
     scheme: ComponentSpec
     dynamics: ComponentSpec
+    choices: Mapping[str, ComponentSpec]
     tasks: Mapping[str, Task]
     task_choices: Mapping[str, ComponentSpec]
     questionnaires: Mapping[str, Questionnaire] = field(default_factory=dict)
@@ -83,7 +84,6 @@ class Study:
     sounds: dict[str, ComponentSpec] = field(default_factory=dict)
     views: dict[str, ComponentSpec] = field(default_factory=dict)
     monitors: dict[str, ComponentSpec] | None = None
-    others: Mapping[str, ComponentSpec] = field(default_factory=dict)
     call_monitor: CallMonitor = field(default_factory=CallMonitor)
     recorded: bool = False
     beyond_operator: tuple[tuple[Place, str], ...] = ()
@@ -95,24 +95,6 @@ class Study:
     def sha256(self) -> str:
         """Hash of the protocol's text, hexadecimal."""
         return hashlib.sha256(self.text.encode()).hexdigest()
-
-    @property
-    def choices(self) -> dict[str, ComponentSpec]:
-        """The components for people, by the part they play: ``scheme``, ``tasks.NAME``."""
-        named = {
-            "tasks": self.task_choices,
-            "questionnaires": self.questionnaire_choices,
-            "feedback": self.cues | self.sounds,
-            "views": self.views,
-            "monitors": self.monitors or {},
-        }
-        return {
-            "input": self.input,
-            "scheme": self.scheme,
-            "dynamics": self.dynamics,
-            **{f"{kind}.{name}": choice for kind in named for name, choice in named[kind].items()},
-            **self.others,
-        }
 
     @property
     def written(self) -> Mapping[str, object]:
@@ -133,7 +115,7 @@ class Study:
         feedback
             Whether views and sounds are shown.
         """
-        used = self.choices | ({"input": self.operator} if simulated else {})
+        used = {**self.choices} | ({"input": self.operator} if simulated else {})
         if not feedback:
             shown = ("feedback.", "views.")
             used = {part: each for part, each in used.items() if not part.startswith(shown)}
@@ -517,24 +499,24 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     if protocol is not None:
         Checker(source, protocol).check(tasks, questionnaires)
     monitors, others = chooser.choose_monitors(), chooser.choose_others()
+    named: dict[str, Mapping[str, ComponentSpec]] = {
+        "tasks": choices,
+        "questionnaires": asked,
+        "feedback": cues | sounds,
+        "views": views,
+        "monitors": monitors or {},
+    }
+    roles = {"input": device, "scheme": scheme, "dynamics": dynamics}
+    there = {part: choice for part, choice in roles.items() if choice}
+    there |= {f"{kind}.{name}": each for kind, of in named.items() for name, each in of.items()}
+    there |= others
     beyond: tuple[tuple[Place, str], ...] = ()
     if machine and not recorded:
-        chosen: dict[Place, ComponentSpec | None] = {
-            ("input",): device,
-            ("operator",): operator,
-            ("scheme",): scheme,
-            ("dynamics",): dynamics,
-            **{("tasks", name): choice for name, choice in choices.items()},
-            **{("feedback", name): choice for name, choice in (cues | sounds).items()},
-            **{("views", name): choice for name, choice in views.items()},
-            **{("questionnaires", name): choice for name, choice in asked.items()},
-            **{("monitors", name): choice for name, choice in (monitors or {}).items()},
-            **{tuple(part.split(".", 1)): choice for part, choice in others.items()},
-        }
-        there = {place: choice for place, choice in chosen.items() if choice}
+        places: dict[Place, ComponentSpec] = {tuple(p.split(".", 1)): c for p, c in there.items()}
+        places |= {("operator",): operator} if operator else {}
         faulty = chooser.but_for_numbers
         pages: dict[Place, Settings] = {("page",): protocol.page} if protocol else {}
-        parts = Parts(machine[0], there | faulty, tasks, pages, {*faulty})
+        parts = Parts(machine[0], places | faulty, tasks, pages, {*faulty})
         references = ReferenceChecker(source, parts)
         references.check()
         beyond = tuple(references.beyond_the_operator())
@@ -551,6 +533,7 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
         operator=operator,
         scheme=scheme,
         dynamics=dynamics,
+        choices=there,
         tasks=tasks,
         task_choices=choices,
         questionnaires=questionnaires,
@@ -559,7 +542,6 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
         sounds=sounds,
         views=views,
         monitors=monitors,
-        others=others,
         call_monitor=chooser.call_monitor,
         recorded=recorded,
         beyond_operator=beyond,

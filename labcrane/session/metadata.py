@@ -112,7 +112,7 @@ def _of_judgement(visit: Visit) -> dict[str, Any]:
 def _of_study(study: Study, *, simulated: bool) -> dict[str, Any]:
     """Return the study as it is run: all its parts, and its description of the data."""
     folder = study.path.parent
-    choices = study.choices | ({"input": study.operator} if simulated else {})
+    choices = {**study.choices} | ({"input": study.operator} if simulated else {})
     return {
         "protocol": study.text,
         "protocol_sha256": study.sha256,

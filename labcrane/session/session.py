@@ -415,7 +415,7 @@ def _triggers(
     study = visit.study
     chosen = {
         part.removeprefix(TRIGGERS): choice
-        for part, choice in study.others.items()
+        for part, choice in study.choices.items()
         if part.startswith(TRIGGERS)
     }
     if visit.fast or not chosen:  # a simulation is over long before any device has seen a pulse

@@ -67,7 +67,7 @@ def _of_gaze(study: Study) -> Doubts:
 @asks
 def _of_pulses(study: Study) -> Doubts:
     """Question events that are sent as pulses, and are learnt long after they happened."""
-    for part, choice in study.others.items():
+    for part, choice in study.choices.items():
         for each in mentioned(choice.settings) if part.startswith("triggers.") else ():
             kind = KINDS.get(str(each.value)) if each.mark == Reference("event") else None
             if kind is not None and kind.learnt:
