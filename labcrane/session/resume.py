@@ -26,7 +26,7 @@ from labcrane.design.practice import WarmUp
 from labcrane.design.tracks import LEVEL, PlannedTrack, Response, TrackState, check_carried
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.protocol.study import Study
-from labcrane.recording.journal_reader import LoggedEvent, SessionLog, read_journal
+from labcrane.recording.journal_reader import SessionLog, read_journal
 from labcrane.recording.paths import parts
 from labcrane.session.standing import EXAMINER, STOP
 from labcrane.types import FloatArray
@@ -113,15 +113,8 @@ class Progress:
     judged: bool = False
     unjudged: Mapping[str, Any] | None = None
 
-    def take(self, name: str, data: Mapping[str, Any], *, closes: bool = True) -> None:
-        """Take up an event.
-
-        Parameters
-        ----------
-        closes
-            Whether the end of a step or a questionnaire that does not say so was one of its own,
-            and not the session's: journals before version 0.2 do not say so.
-        """
+    def take(self, name: str, data: Mapping[str, Any]) -> None:
+        """Take up an event."""
         match name:
             case "session.start":
                 self.stop, self.called_complete = KILLED, False
@@ -135,12 +128,12 @@ class Progress:
                 self._take_void(numbers(data["void"]))
             case "order.completion" | "order.override" | "judgement.over":
                 self._take_judgement(name, data)
-            case "step.end" if data.get("done", closes):
+            case "step.end" if data["done"]:
                 self.steps.add(data["step"])
             case "trial.start" | "trial.end":
                 self._take_trial(name, data)
             case "questionnaire.answer" | "questionnaire.end":
-                self._take_questionnaire(name, data, closes=closes)
+                self._take_questionnaire(name, data)
             case "pause.start" | "pause.end" | "stop_rule.met":
                 self._take_hold(name, data)
 
@@ -175,13 +168,13 @@ class Progress:
             if (response := Response.of(data)) is not None:
                 self.responses[number] = response
 
-    def _take_questionnaire(self, name: str, data: Mapping[str, Any], *, closes: bool) -> None:
+    def _take_questionnaire(self, name: str, data: Mapping[str, Any]) -> None:
         rating = "trial" in data
         key = (data["trial"] if rating else data["step"], data["questionnaire"])
         if name == "questionnaire.answer":
             given = (self.ratings if rating else self.answers).setdefault(key, {})
             given[data["item"]] = data["value"]
-        elif data.get("done", data["handed_in"] or closes):
+        elif data["done"]:
             (self.rated if rating else self.handed_in).add(key)
 
     def _take_judgement(self, name: str, data: Mapping[str, Any]) -> None:
@@ -267,9 +260,9 @@ def progress(journal: Path, joints: Sequence[str]) -> Progress:
     time = float(log.time[-1]) if len(log.time) else None
     angles = _angles(log, joints)
     so_far = Progress(angles=tuple(angles[-1].tolist()) if len(angles) else (), time=time)
-    for event, closes in _with_closing(log.events):
+    for event in log.events:
         try:
-            so_far.take(event.name, event.data, closes=closes)
+            so_far.take(event.name, event.data)
         except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
             raise RecordingError(
                 f"{journal}: event {event.name!r} at {event.time:.3f} s lacks a value "
@@ -281,22 +274,6 @@ def progress(journal: Path, joints: Sequence[str]) -> Progress:
             if at < len(angles) and np.isfinite(angles[at]).all():
                 so_far.starts[event.data["trial"]] = tuple(angles[at].tolist())
     return so_far
-
-
-def _with_closing(events: Sequence[LoggedEvent]) -> Iterator[tuple[LoggedEvent, bool]]:
-    """Yield events, and whether an end among them was its own: not that of an ending session."""
-    last_ticks = {
-        (event.part, event.tick)
-        for event in events
-        if event.name == "session.end" and event.data.get("reason") != COMPLETE
-    }
-    ordered = False
-    for event in events:
-        if event.name == "session.start":
-            ordered = False
-        elif event.name == "order.end" and event.data.get("refused") is None:
-            ordered = True
-        yield event, not (ordered or (event.part, event.tick) in last_ticks)
 
 
 def _angles(log: SessionLog, joints: Sequence[str]) -> FloatArray:

@@ -32,7 +32,7 @@ from labcrane.recording.participant_file.session_group import _trial_rows
 from labcrane.recording.paths import parts
 from labcrane.session import session as session_module
 from labcrane.session.commands import Command, LauncherGone, Order
-from labcrane.session.resume import Progress, _with_closing, numbers, progress, remaining
+from labcrane.session.resume import numbers, progress, remaining
 from labcrane.session.session import Visit, record
 
 RESULTS = {"success", "failure", "timeout", "skipped"}
@@ -317,36 +317,6 @@ class Stops(RuleBasedStateMachine):
         with pytest.raises(ProtocolError, match="is complete, so there is nothing"):
             record(replace(self.visit, resumed=True, policy=policy), Room(None, 0, None))
 
-    @precondition(lambda self: not self.over and "redo_block" not in self.policies)
-    @rule()
-    def read_as_before_the_new_events(self) -> None:
-        """What is owed follows from the events of old journals as well.
-
-        What ended in the very tick in which its session did is done again.
-        """
-        journal = parts(self.visit.journal)
-        if not journal or self.torn:
-            return
-        old = Progress(starts=progress(self.visit.journal, self.visit.study.machine.names).starts)
-        for event, closes in _with_closing(self.events):
-            data = {key: event.data[key] for key in event.data if key not in {"done", "owed"}}
-            if event.name != "session.resumed":
-                old.take(event.name, data, closes=closes)
-        left = remaining(self.visit.study, self.whole, old, "redo_trial")
-        trials = [
-            [trial for each in plan.blocks for trial in each.trials] for plan in (left, self.owed)
-        ]
-        assert trials[0] == trials[1]
-        assert {step.number for step in left.steps} >= {step.number for step in self.owed.steps}
-
-    @property
-    def torn(self) -> bool:
-        """Whether an ending was cut off in its middle: journals of before cannot tell it."""
-        events = self.events
-        return any(event.name == "launcher.gone" for event in events) and not any(
-            event.name == "session.end" for event in events
-        )
-
     def teardown(self) -> None:
         if not hasattr(self, "visit"):
             return
@@ -410,12 +380,12 @@ def test_a_practice_that_was_enough_does_not_stand_for_the_next_one(stops: type[
     one.teardown()
 
 
-@pytest.mark.long
-def test_two_hundred_and_fifty_sequences_of_stops_owe_what_is_left(stops: type[Stops]) -> None:
-    play(stops, 250)
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(1800)
-def test_two_thousand_sequences_of_stops_owe_what_is_left(stops: type[Stops]) -> None:
-    play(stops, 2000)
+@pytest.mark.parametrize(
+    "sequences",
+    [
+        pytest.param(250, marks=pytest.mark.long),
+        pytest.param(2000, marks=[pytest.mark.soak, pytest.mark.timeout(1800)]),
+    ],
+)
+def test_drawn_sequences_of_stops_owe_what_is_left(stops: type[Stops], sequences: int) -> None:
+    play(stops, sequences)
