@@ -41,17 +41,15 @@ def find_machine(name: str, beside: Path | None = None) -> Path:
     )
 
 
-def load_machine(
-    name: str | Mapping[str, Any], beside: Path | None = None, *, recorded: bool = False
-) -> Machine:
-    """Return a machine as a protocol names it; ``recorded`` is whether it is of a session that ran.
+def load_machine(name: str | Mapping[str, Any], beside: Path | None = None) -> Machine:
+    """Return a machine as a protocol names it.
 
     Raises
     ------
     ProtocolError
         The machine does not exist, or its file is wrong; the message names file and line.
     """
-    return read_machine(name, beside, recorded=recorded)[0]
+    return read_machine(name, beside)[0]
 
 
 def read_machine(

@@ -16,8 +16,7 @@ frame the time its tick was due, an event the time it happened.
 
 import ctypes
 import time
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -52,13 +51,10 @@ class Outlets:
     source
         Which session this is, the same whenever it is resumed: ``"aiming/P001/ses-01"``. The
         streams' source ids are made of it, so that a recorder finds a restarted session again.
-    codes
-        Codes for event names beside ``CODES``, for the numeric marker stream.
     """
 
-    def __init__(self, run: Run, source: str, codes: Mapping[str, int] | None = None) -> None:
+    def __init__(self, run: Run, source: str) -> None:
         check_clock()
-        self._codes = dict(CODES) | dict(codes or {})
         state = stream_info(
             STATE, "MoCap", run.state.size, "double64", rate_hz=run.rate_hz, source=source
         )
@@ -71,7 +67,7 @@ class Outlets:
         channel(markers, label="event", unit="none", type="JSON")
         numbers = stream_info(CODE_STREAM, "Markers", 1, "int32", rate_hz=0.0, source=source)
         channel(numbers, label="code", unit="none", type="Code")
-        _describe_codes(numbers, self._codes)
+        _describe_codes(numbers)
         names = stream_info(LABELS, "Markers", 1, "string", rate_hz=0.0, source=source)
         channel(names, label="label", unit="none", type="Label")
         _describe_labels(names)
@@ -95,7 +91,7 @@ class Outlets:
             _check_stamp(event.time)
             self._markers.push_sample([event_text(event, frame.tick.number)], event.time)
             self._names.push_sample([self._labels.label(event)], event.time)
-            self._numbers.push_sample([self._codes.get(event.name, OTHER)], event.time)
+            self._numbers.push_sample([CODES.get(event.name, OTHER)], event.time)
 
     def close(self) -> None:
         """End the streams: receivers see them disappear."""
@@ -224,10 +220,9 @@ def _describe_input(info: "pylsl.StreamInfo", layout: Layout) -> None:
         channel(info, label=column, unit="normalized", type="Button" if button else "Axis")
 
 
-def _describe_codes(info: "pylsl.StreamInfo", codes: Mapping[str, int]) -> None:
+def _describe_codes(info: "pylsl.StreamInfo") -> None:
     table = info.desc().append_child("codes")
-    entries: list[tuple[str, Any]] = [("any other event", OTHER), *codes.items()]
-    for name, number in entries:
+    for name, number in (("any other event", OTHER), *CODES.items()):
         entry = table.append_child("code")
         entry.append_child_value("event", name)
         entry.append_child_value("value", str(number))

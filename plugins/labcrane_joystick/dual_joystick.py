@@ -38,9 +38,9 @@ class DualJoystick(InputDevice):
 
     signals = tuple(Signal(side, "1", PARTS) for side in SIDES)
 
-    def __init__(self, settings: JoystickSettings, path: Path | None = None) -> None:
+    def __init__(self, settings: JoystickSettings) -> None:
         self._model = settings.stick
-        self._path = path or default_path()
+        self._path = default_path()
         self._stored: Calibrations | None = None
         self._started = False
         self._sticks: list[Stick | None] = [None, None]
