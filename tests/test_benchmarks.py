@@ -3,14 +3,12 @@
 import ast
 import dataclasses
 import importlib
-import itertools
 import subprocess
 import sys
 import time
 import types
 from pathlib import Path
 
-import numpy as np
 import pytest
 from needs import needs
 
@@ -125,13 +123,6 @@ def test_the_table_that_is_kept_has_the_head_and_the_columns_that_are_written_no
     assert {row.count("|") for row in rows} == {main.HEAD.count("|")}
 
 
-@pytest.mark.parametrize("limit", [float("inf"), float("nan"), 0.0])
-def test_a_row_without_a_limit_that_can_be_missed_is_none(limit: float) -> None:
-    row = importlib.import_module("benchmarks.table").Row
-    with pytest.raises(ValueError, match=f"a: b: {limit} cannot limit a ratio"):
-        row("a", "b", 1.0, 1.0, "c", limit)
-
-
 def test_every_benchmark_makes_rows_and_says_their_limits_itself() -> None:
     main = importlib.import_module("benchmarks.__main__")
     row = importlib.import_module("benchmarks.table").Row
@@ -201,136 +192,6 @@ def test_a_component_that_takes_two_milliseconds_more_a_tick_is_missed(
     assert bool(missed) == bool(slower_s), rows
 
 
-def test_an_engine_that_costs_more_than_it_may_is_missed() -> None:
-    tick = importlib.import_module("benchmarks.tick")
-    missed = importlib.import_module("benchmarks.table").missed
-    assert not missed([tick.engine_row({"bullet_crane": 1e-5, "mujoco_crane": 6e-6})])
-    assert missed([tick.engine_row({"bullet_crane": 1e-5, "mujoco_crane": 8e-6})])
-
-
-SESSION_HZ = 240
-
-
-def held_where(late: dict[str, set[int]]) -> dict[str, float]:
-    """Return the rates held by loops that are late at some steps and at no other."""
-    tick = importlib.import_module("benchmarks.tick")
-    steps = {rate: number for number, rate in enumerate(tick.RATES_HZ)}
-    return tick.rates(Path(), lambda kind, rate, _: float(steps[rate] in late[kind]))
-
-
-def test_a_rate_above_one_that_is_not_held_does_not_count() -> None:
-    tick = importlib.import_module("benchmarks.tick")
-    found = held_where({"empty": {9}, "whole": {3, 5}})
-    assert found == {"empty": tick.RATES_HZ[8], "whole": tick.RATES_HZ[2]}
-
-
-@pytest.mark.parametrize("late", [{"whole"}, {"empty"}, {"whole", "empty"}])
-def test_a_loop_that_holds_not_even_the_lowest_rate_is_missed(late: set[str]) -> None:
-    tick = importlib.import_module("benchmarks.tick")
-    missed = importlib.import_module("benchmarks.table").missed
-    held = held_where({kind: {0} if kind in late else set() for kind in ("empty", "whole")})
-    assert missed([tick.rate_row(held)])
-    assert not missed([tick.rate_row(held_where({"empty": set(), "whole": set()}))])
-
-
-def test_rates_rise_in_steps_of_a_fifth_from_that_of_a_session() -> None:
-    tick = importlib.import_module("benchmarks.tick")
-    steps = [upper / lower for lower, upper in itertools.pairwise(tick.RATES_HZ)]
-    assert tick.RATES_HZ[0] == SESSION_HZ
-    assert max(steps) < 1.21
-    assert tick.SLOWEST < 2.5, "no loop may lose half its rate and half of the rest unseen"
-
-
-def promised_of(**changed: object) -> list[str]:
-    """Return what is missed of ten draws that keep all promises, but for what is changed."""
-    score = importlib.import_module("streams.unkind_score")
-    fault = next(iter(score.Fault))
-    kept = score.Score(
-        row="unkind", p95=0.1, most=0.2, cover=1.0, width=0.1, passed=True, usual=0.5,
-        untouched=0.5, named=frozenset({fault}), present=frozenset({fault}), clean=True, limit=0.2,
-        samples=1000, apart=0.1, usual_apart=0.5, apart_limit=0.2, chance=False,
-    )  # fmt: skip
-    draws = [kept] * 9 + [dataclasses.replace(kept, **changed)]
-    sync = importlib.import_module("benchmarks.sync")
-    return importlib.import_module("benchmarks.table").missed(sync.promises(draws))
-
-
-@pytest.mark.parametrize(
-    ("changed", "missed"),
-    [
-        ({}, []),
-        (
-            {"p95": 0.3, "usual": 0.6},
-            ["draws of misbehaving devices that miss a target, and one is 2"],
-        ),
-        (
-            {"p95": 9.9, "usual": 0.1, "untouched": 10.0, "clean": False},
-            ["misbehaving devices worse than by pyxdf, and one is 2"],
-        ),
-        ({"cover": 0.95, "samples": 9000}, ["samples beyond what is stated, % is 2.5"]),
-        ({"named": frozenset()}, ["worst fault: wrong or left out, % is 10"]),
-        ({"present": frozenset()}, ["worst fault: wrong or left out, % is 10"]),
-    ],
-)
-def test_each_promise_of_unkind_devices_that_is_broken_is_missed(
-    changed: dict[str, object], missed: list[str]
-) -> None:
-    found = promised_of(**changed)
-    assert len(found) == len(missed), found
-    for line, words in zip(found, missed, strict=True):
-        assert line.startswith(f"sync: {words},")
-
-
-def test_each_unkind_device_is_a_row_with_a_limit_that_its_error_can_miss() -> None:
-    score = importlib.import_module("streams.unkind_score")
-    sync = importlib.import_module("benchmarks.sync")
-    missed = importlib.import_module("benchmarks.table").missed
-    good = score.Score(
-        row="good", p95=0.1, most=0.2, cover=1.0, width=0.1, passed=True, usual=0.5,
-        untouched=0.5, named=frozenset(), present=frozenset(), clean=True, limit=0.2,
-        samples=1000, apart=0.1, usual_apart=0.5, apart_limit=0.2, chance=False, stated=3.0,
-    )  # fmt: skip
-    beyond = dataclasses.replace(good, row="beyond", p95=0.31)
-    late = dataclasses.replace(good, row="late", p95=2.9, clean=False)
-    untold = dataclasses.replace(late, row="untold", p95=3.1)
-    rows = sync.of_devices([good, good, good, beyond, late, untold])
-    assert [row.what.partition(",")[0] for row in rows] == ["good", "beyond", "late", "untold"]
-    assert [line.partition(",")[0] for line in missed(rows)] == ["sync: beyond", "sync: untold"]
-
-
-@pytest.mark.parametrize(("wrong", "clocks"), [(0, 3), (1, 3), (0, 2), (0, 4)])
-def test_a_wrong_stamp_or_a_clock_that_is_not_found_after_restarts_is_missed(
-    wrong: int, clocks: int
-) -> None:
-    sync = importlib.import_module("benchmarks.sync")
-    missed = importlib.import_module("benchmarks.table").missed
-    assert len(missed(sync.restarted(wrong, clocks, 2))) == (wrong > 0) + (clocks != 3)
-
-
-ENDING = "import sys; print({said!r}); print('no gcc', file=sys.stderr); sys.exit({code})"
-
-
-@pytest.mark.parametrize(
-    ("ours", "code", "fails"), [(1.0, 0, False), (3.0, 1, False), (1.0, 1, True), (None, 1, True)]
-)
-def test_the_exit_status_of_the_benchmark_of_sync_counts(
-    *, ours: float | None, code: int, fails: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    sync = importlib.import_module("benchmarks.sync")
-    table = importlib.import_module("benchmarks.table")
-    rows = [] if ours is None else [table.Row("sync", "error, ms", ours, 2.0, "limit", 1.0)]
-    said = table.dumped(rows) if rows else "a table that ends"
-    run = subprocess.run
-    program = [sys.executable, "-c", ENDING.format(said=said, code=code)]
-    monkeypatch.setattr(sync.subprocess, "run", lambda _, **how: run(program, **how))
-    if fails:
-        with pytest.raises(RuntimeError, match="no gcc"):
-            sync.rows()
-    else:
-        assert sync.rows() == rows
-        assert bool(table.missed(rows)) == bool(code)
-
-
 def test_memory_is_that_of_the_command_itself_and_not_of_who_started_it() -> None:
     own_process = importlib.import_module("benchmarks.own_process")
     ballast = bytearray(400_000_000)
@@ -374,21 +235,3 @@ def test_what_has_become_slower_since_a_commit_is_named(
     said = capsys.readouterr().out
     assert "step: a: only before, not compared" in said
     assert "step: c: only now, not compared" in said
-
-
-def test_a_scenario_whose_ticks_are_slower_than_promised_or_too_long_is_missed() -> None:
-    scenario = importlib.import_module("benchmarks.scenario")
-    tick = 1.0 / scenario.RATE_HZ
-
-    missed = importlib.import_module("benchmarks.table").missed
-
-    def told(casualty: float, reach_over: float = 6e-4) -> list[str]:
-        taken = {"kinematic": 4e-5, "casualty": casualty, "carry": 6e-4, "reach_over": reach_over}
-        return missed(scenario.tick_rows({name: [np.full(9, one)] for name, one in taken.items()}))
-
-    assert not told(0.98 * scenario.LIMITS["casualty"] * 4e-5)
-    (slow,) = told(1.02 * scenario.LIMITS["casualty"] * 4e-5)
-    assert "casualty, median" in slow
-    assert len(told(0.81 * tick)) == 2
-    (slow,) = told(4e-5, 1.04 * scenario.LIMITS["reach_over"] * 4e-5)
-    assert "reach_over, median" in slow

@@ -70,20 +70,6 @@ def test_a_stage_is_kept_for_each_system_and_python_that_it_ran_on(tmp_path: Pat
     assert by_python["3.14"][-1] == "abc1234"
 
 
-def test_a_run_on_any_python_of_a_system_replaces_the_row_that_says_there_was_none(
-    tmp_path: Path,
-) -> None:
-    table = EVIDENCE.systems_table(after(tmp_path, "full", RUN | {"system": "Darwin"}))
-    assert [row[:2] for row in rows(table, "macOS")] == [["3.14", "full"]]
-
-
-def test_a_newer_run_of_a_stage_takes_the_place_of_the_older_one(tmp_path: Path) -> None:
-    old = after(tmp_path, "pythons", RUN, RUN | {"python": "3.12.1"})
-    (tmp_path / "runs").write_text(json.dumps(RUN | {"passed": 9}) + "\n", encoding="utf-8")
-    new = EVIDENCE.kept(old, "pythons", "passed", ("1", "1"), tmp_path / "runs", "abc1234")
-    assert [(one["python"], one["passed"]) for one in new["systems"]] == [("3.12", 7), ("3.14", 9)]
-
-
 @pytest.mark.parametrize(
     ("said", "counts"),
     [
@@ -96,23 +82,6 @@ def test_tests_are_counted_in_what_a_command_says(said: str, counts: tuple[int, 
     run = EVIDENCE.noted("Windows under Wine", "3.11", "a study day", "1", said)
     assert (run["passed"], run["failed"], run["skipped"]) == counts
     assert run["status"] == 1
-
-
-def test_wheels_that_are_not_there_are_named(tmp_path: Path) -> None:
-    found = [
-        {
-            "platform": name,
-            "python": "3.14",
-            "set": "lab",
-            "resolved": name != "aarch64-apple-darwin",
-            "without": ["pyo"] if "windows" in name else [],
-        }
-        for name in EVIDENCE.PLATFORMS
-    ]
-    (tmp_path / "runs.wheels").write_text("".join(json.dumps(one) + "\n" for one in found))
-    table = EVIDENCE.wheels_table(after(tmp_path, "wheels"))
-    assert "| lab | 3.14 | all | all but pyo | **not resolved** | all |" in table
-    assert "| all | 3.14 | not tried | not tried | not tried | not tried |" in table
 
 
 def test_every_stage_of_the_nightly_run_has_a_row() -> None:
@@ -187,39 +156,10 @@ def test_a_run_in_parts_says_how_much_has_passed_and_of_which_commits(
     assert [one["ended"] for one in record["systems"]] == [ended]
 
 
-def test_figures_of_all_parts_of_a_run_are_shown_as_one(tmp_path: Path) -> None:
-    def run(before: int, values: int, largest: float) -> dict[str, Any]:
-        figure = {"test": "a.py::test_b", "what": "lost, s", "values": values, "largest": largest}
-        return RUN | {"parts": part(before, 7, "a"), "figures": [figure]}
-
-    record = after(tmp_path, "soak", run(0, 3, 0.25))
-    for before, values, largest, row in (
-        (7, 0, 0, ["`test_b`", "lost, s", "3", "0.25"]),
-        (7, 2, 0.125, ["`test_b`", "lost, s", "5", "0.25"]),
-        (0, 0, 0, ["`test_b`", "lost, s", "0", "none"]),
-    ):
-        (tmp_path / "runs").write_text(json.dumps(run(before, values, largest)) + "\n")
-        record = EVIDENCE.kept(record, "soak", "passed", ("1", "1"), tmp_path / "runs", "abc1234")
-        assert rows(EVIDENCE.figures_table(record), "soak") == [row]
-
-
-def test_wheels_that_nothing_resolved_are_not_passed(tmp_path: Path) -> None:
-    record = after(tmp_path, "wheels")
-    assert record["stages"]["wheels"]["ended"] == "not tried: nothing was resolved"
-
-
 def test_no_row_of_the_record_has_passed_without_a_test() -> None:
     counted = [*RECORD["systems"]]
     counted += [one for name, one in RECORD["stages"].items() if name not in EVIDENCE.UNCOUNTED]
     assert [one for one in counted if one["ended"].startswith("passed") and not one["passed"]] == []
-
-
-def test_the_nightly_run_reads_the_commit_before_the_stage_begins() -> None:
-    lines = (ROOT / ".ci" / "nightly").read_text(encoding="utf-8").splitlines()
-    (read,) = (at for at, line in enumerate(lines) if "git rev-parse --short HEAD" in line)
-    (began,) = (at for at, line in enumerate(lines) if 'stages "$2"' in line)
-    assert read < began
-    assert "rev-parse" not in (ROOT / ".ci" / "evidence").read_text(encoding="utf-8")
 
 
 def passed_pythons() -> set[str]:

@@ -3,12 +3,11 @@
 import gzip
 import hashlib
 import io
-import random
 import re
 import shutil
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import h5py
@@ -183,33 +182,19 @@ def own(folder: Path, name: str) -> dict[str, str]:
 
 def killed_and_finished(
     snapshot: Snapshot,
-    seed: int,
-    kills: int,
+    numbers: Sequence[int],
     work: Callable[[Lab], object],
     is_done: Callable[[Lab], bool],
     check: Callable[[Lab], None],
 ) -> int:
-    """Kill ``work`` at writes drawn at random, finish it by the next call, and check.
+    """Kill ``work`` at each of these writes, finish it by the next call, and check.
 
-    Returns how many calls were killed.
+    Returns how many calls were killed before one came to its end.
     """
-    draws, killed = random.Random(seed), 0
-    for _ in range(kills):
-        killed += _killed_and_finished(snapshot, draws.randint(1, 120), work, is_done, check)
-    return killed
-
-
-def killed_at_every_write(
-    snapshot: Snapshot,
-    work: Callable[[Lab], object],
-    is_done: Callable[[Lab], bool],
-    check: Callable[[Lab], None],
-) -> int:
-    """Kill ``work`` at its first write, then at its second one, until it ends; return how many."""
-    number = 1
-    while _killed_and_finished(snapshot, number, work, is_done, check):
-        number += 1
-    return number - 1
+    for killed, number in enumerate(numbers):
+        if not _killed_and_finished(snapshot, number, work, is_done, check):
+            return killed
+    return len(numbers)
 
 
 def _killed_and_finished(

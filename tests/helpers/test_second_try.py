@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from gate_program import gate_program
-from second_try import QUICK, without_group
+from second_try import without_group
 
 TESTS = """
 from pathlib import Path
@@ -90,57 +89,6 @@ def test_more_than_three_in_all_stages_of_a_gate_get_no_second_try(tmp_path: Pat
     status, said, _ = gate_in(tmp_path, once=(0, 1))
     assert status == 1
     assert "no second try: 4 tests failed in this gate, 3 may" in said
-
-
-FIXTURE = """
-
-@pytest.fixture(scope="module")
-def shared():
-    tried = Path("tried-fixture")
-    before = tried.exists()
-    tried.touch()
-    assert before
-
-@pytest.mark.parametrize("number", range(6))
-def test_of_a_fixture(shared, number):
-    pass
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("processes", ["0", "2"])
-def test_a_fixture_that_fails_counts_as_one_test(tmp_path: Path, processes: str) -> None:
-    status, said, noted = gate_in(tmp_path, once=(0, 1), processes=processes, more=FIXTURE)
-    assert (status, noted["status"], noted["faults"]) == (0, 0, 3), said
-    assert "test_some.py::test_of_a_fixture[0]" in noted["second_try"]
-    assert len(noted["second_try"]) > 3
-
-
-@pytest.mark.slow
-def test_a_run_after_a_command_of_its_stage_counts_as_any_other(tmp_path: Path) -> None:
-    line = gate_program("evidence").noted("Linux", "3.13", "labcrane demo", "0", "")
-    (tmp_path / "runs").write_text(json.dumps(line) + "\n")
-    status, said, noted = gate_in(tmp_path, once=(1,))
-    assert (status, noted["second_try"]) == (0, ["test_some.py::test_it[1]"]), said
-
-
-@pytest.mark.slow
-def test_a_run_in_which_nothing_fails_needs_none(tmp_path: Path) -> None:
-    status, said, noted = gate_in(tmp_path)
-    assert (status, noted["passed"], noted["second_try"]) == (0, 6, [])
-    assert "second try" not in said
-    assert "s of processor" in said
-
-
-@pytest.mark.slow
-def test_quick_tests_that_take_too_much_of_a_processor_are_named_and_fail_nothing(
-    tmp_path: Path,
-) -> None:
-    status, said, _ = gate_in(tmp_path, "-m", QUICK)
-    assert status == 0
-    assert "s of processor: more than the 0 s of quick tests" in said
-    (tmp_path / "passed").unlink()
-    assert "of quick tests" not in gate_in(tmp_path)[1]
 
 
 @pytest.mark.slow

@@ -13,7 +13,16 @@ from pathlib import Path
 import pytest
 from needs import SKIP_NOTHING
 
+from labcrane import DeviceError
+from labcrane.core import Layout
+from labcrane.testing import ch8, make_frame, make_run, opened
 from labcrane_joystick import sdl
+from labcrane_joystick.calibration import Calibration, Calibrations
+from labcrane_joystick.dual_joystick import DualJoystick
+from labcrane_joystick.settings import JoystickSettings
+
+MODEL = "044f:b10a"
+COLUMNS = Layout("the joysticks", DualJoystick.signals).columns
 
 SDL_INIT_JOYSTICK = 0x200
 FLIGHT_STICK = 4
@@ -169,3 +178,20 @@ def _mapped_sdl() -> ctypes.CDLL:
     library.SDL_JoystickSetVirtualAxis.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_int16]
     library.SDL_JoystickSetVirtualButton.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_uint8]
     return library
+
+
+def read(device: DualJoystick) -> dict[str, float]:
+    run = make_run(ch8(), axes=device.signals)
+    frame = make_frame(run)
+    return dict(zip(COLUMNS, device.read(frame.tick, frame).tolist(), strict=True))
+
+
+def open_fails(**settings: str) -> str:
+    device = DualJoystick(JoystickSettings(**settings))
+    with pytest.raises(DeviceError) as refused, opened(device, make_run(ch8())):
+        pass
+    return str(refused.value)
+
+
+def both(left: Calibration, right: Calibration) -> Calibrations:
+    return Calibrations(date="2025-01-31", left=left, right=right)

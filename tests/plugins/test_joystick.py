@@ -5,24 +5,19 @@ from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
-from virtual_sticks import Desk, VirtualStick, desk
+from virtual_sticks import COLUMNS, MODEL, Desk, VirtualStick, both, desk, open_fails, read
 
-from labcrane import DeviceError, InputDevice
-from labcrane.core import Layout
-from labcrane.testing import InputContract, ch8, make_frame, make_run, opened
+from labcrane import InputDevice
+from labcrane.testing import InputContract, ch8, make_run, opened
 from labcrane_joystick import labcrane_inputs
 from labcrane_joystick.calibration import (
     AxisRange,
     Calibration,
-    Calibrations,
     save,
 )
 from labcrane_joystick.dual_joystick import DualJoystick
 from labcrane_joystick.settings import JoystickSettings
 from labcrane_joystick.stick import attached, model_of
-
-MODEL = "044f:b10a"
-COLUMNS = Layout("the joysticks", DualJoystick.signals).columns
 
 
 @pytest.fixture(autouse=True)
@@ -62,25 +57,8 @@ class TestDualJoystick(InputContract):
         return offer.build(JoystickSettings(), ch8())
 
 
-def read(device: DualJoystick) -> dict[str, float]:
-    run = make_run(ch8(), axes=device.signals)
-    frame = make_frame(run)
-    return dict(zip(COLUMNS, device.read(frame.tick, frame).tolist(), strict=True))
-
-
-def open_fails(**settings: str) -> str:
-    device = DualJoystick(JoystickSettings(**settings))
-    with pytest.raises(DeviceError) as refused, opened(device, make_run(ch8())):
-        pass
-    return str(refused.value)
-
-
 def ports() -> list[str]:
     return [stick.port for stick in attached()]
-
-
-def both(left: Calibration, right: Calibration) -> Calibrations:
-    return Calibrations(date="2025-01-31", left=left, right=right)
 
 
 def test_every_axis_and_trigger_arrives_at_its_own_side(sticks, running):

@@ -6,16 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_sticks import Desk, VirtualStick, desk
+from virtual_sticks import MODEL, Desk, VirtualStick, both, desk, read
 
 from labcrane import DeviceError
-from labcrane.core import Layout
-from labcrane.testing import ch8, make_frame, make_run, opened
+from labcrane.testing import ch8, make_run, opened
 from labcrane_joystick.__main__ import set_up, wait_and_look
 from labcrane_joystick.calibration import (
     AxisRange,
     Calibration,
-    Calibrations,
     default_path,
     load,
     save,
@@ -24,9 +22,6 @@ from labcrane_joystick.dual_joystick import DualJoystick
 from labcrane_joystick.procedure import calibrate, identify
 from labcrane_joystick.settings import JoystickSettings
 from labcrane_joystick.stick import attached
-
-MODEL = "044f:b10a"
-COLUMNS = Layout("the joysticks", DualJoystick.signals).columns
 
 
 @pytest.fixture
@@ -39,16 +34,6 @@ def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def table() -> Iterator[Desk]:
     with desk() as table:
         yield table
-
-
-def both(left: Calibration, right: Calibration) -> Calibrations:
-    return Calibrations(date="2025-01-31", left=left, right=right)
-
-
-def read(device: DualJoystick) -> dict[str, float]:
-    run = make_run(ch8(), axes=device.signals)
-    frame = make_frame(run)
-    return dict(zip(COLUMNS, device.read(frame.tick, frame).tolist(), strict=True))
 
 
 def test_each_side_of_an_axis_is_linear_to_its_own_end():

@@ -8,14 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from virtual_sticks import Desk, desk
+from virtual_sticks import Desk, desk, open_fails
 
-from labcrane import DeviceError
-from labcrane.testing import ch8, make_run, opened
 from labcrane_joystick import sdl
-from labcrane_joystick.dual_joystick import DualJoystick
 from labcrane_joystick.kernel import ABSINFO, axis_codes, fuzz_and_flat, read_request
-from labcrane_joystick.settings import JoystickSettings
 from labcrane_joystick.stick import open_nodes, socket_of
 
 
@@ -28,13 +24,6 @@ def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def table() -> Iterator[Desk]:
     with desk() as table:
         yield table
-
-
-def open_fails(**settings: str) -> str:
-    device = DualJoystick(JoystickSettings(**settings))
-    with pytest.raises(DeviceError) as refused, opened(device, make_run(ch8())):
-        pass
-    return str(refused.value)
 
 
 def test_no_stick_is_an_error_that_says_so(table):

@@ -70,10 +70,10 @@ limit_s: 60
 FORCE = "scene.block.force.block"
 
 
-def judged(tmp_path: Path, pushes: list[float], *, lift_limits: bool = False):
-    """Return the task's judgements of a force on the block, tick by tick."""
-    (tmp_path / "block.yaml").write_text(BLOCK, encoding="utf-8")
-    task = Scenario(ScenarioSettings(scenes=(tmp_path / "block.yaml",), mistakes=4), ch8())
+def at_the_block(text: str, folder: Path, **settings: int) -> tuple[Run, Scenario]:
+    """Return a run in a scene with the block, and its task in its first trial."""
+    (folder / "block.yaml").write_text(text, encoding="utf-8")
+    task = Scenario(ScenarioSettings(scenes=(folder / "block.yaml",), **settings), ch8())
     state = (
         *crane_state(ch8()).signals,
         OVERLOAD,
@@ -84,6 +84,12 @@ def judged(tmp_path: Path, pushes: list[float], *, lift_limits: bool = False):
     run = make_run(ch8(), state=state, task=task.signals)
     task.open(run)
     task.begin_trial(make_trial(PlannedTrial({"scenario": "block"}, expected_s=1.0)))
+    return run, task
+
+
+def judged(tmp_path: Path, pushes: list[float], *, lift_limits: bool = False):
+    """Return the task's judgements of a force on the block, tick by tick."""
+    run, task = at_the_block(BLOCK, tmp_path, mistakes=4)
     if lift_limits:
         task.lift_limits()
     seen = []
@@ -234,18 +240,7 @@ TOUCH = BLOCK.replace(
 
 def touching(folder: Path, forces: list[float], *, away: float = 0.0) -> tuple[list[float], int]:
     """Return ``target.touch`` tick by tick, and in which the goal was reached; -1 in none."""
-    (folder / "block.yaml").write_text(TOUCH, encoding="utf-8")
-    task = Scenario(ScenarioSettings(scenes=(folder / "block.yaml",)), ch8())
-    state = (
-        *crane_state(ch8()).signals,
-        OVERLOAD,
-        Signal("scene.block.position", "m", ("x", "y", "z")),
-        Signal("scene.block.force", "N", ("block",)),
-        Signal("scene.block.support", "N"),
-    )
-    run = make_run(ch8(), state=state, task=task.signals)
-    task.open(run)
-    task.begin_trial(make_trial(PlannedTrial({"scenario": "block"}, expected_s=1.0)))
+    run, task = at_the_block(TOUCH, folder)
     touched: list[float] = []
     for number, force in enumerate(forces):
         values = np.zeros(run.state.size)

@@ -201,11 +201,18 @@ def test_a_closed_writer_says_so(tmp_path: Path) -> None:
         writer.write_sample(number, 0.0, np.zeros(1))
 
 
-def test_stamps_that_were_left_out_are_deduced_from_the_rate_as_pyxdf_does(tmp_path: Path) -> None:
+@pytest.mark.parametrize("texts", [False, True])
+def test_stamps_that_were_left_out_are_deduced_from_the_rate_as_pyxdf_does(
+    tmp_path: Path, *, texts: bool
+) -> None:
     """LabRecorder leaves out stamps that follow from the one before."""
-    header = StreamHeader("n", "EEG", channels(1), "double64", 10.0)
-    body = b"\x08" + np.float64(5.0).tobytes() + np.float64(1.0).tobytes()
-    body += b"".join(b"\x00" + np.float64(k).tobytes() for k in (2.0, 3.0))
+    header = StreamHeader("n", "EEG", channels(1), "string" if texts else "double64", 10.0)
+    values = (1.0, 2.0, 3.0)
+    first, *others = (
+        b"\x01\x01%d" % value if texts else np.float64(value).tobytes() for value in values
+    )
+    body = b"\x08" + np.float64(5.0).tobytes() + first
+    body += b"".join(b"\x00" + value for value in others)
     path = tmp_path / "x.xdf"
     path.write_bytes(
         b"XDF:"
@@ -217,26 +224,8 @@ def test_stamps_that_were_left_out_are_deduced_from_the_rate_as_pyxdf_does(tmp_p
     stream = read_xdf(path).stream("n")
     np.testing.assert_allclose(stream.stamps, [5.0, 5.1, 5.2])
     np.testing.assert_allclose(load(path)["n"]["time_stamps"], stream.stamps)
-    np.testing.assert_array_equal(stream.data[:, 0], [1, 2, 3])
-
-
-def test_texts_whose_stamps_were_left_out_go_on_at_their_rate(tmp_path: Path) -> None:
-    """They repeated the stamp of the one before."""
-    header = StreamHeader("n", "Words", channels(1), "string", 10.0)
-    body = b"\x08" + np.float64(5.0).tobytes() + b"\x01\x01a"
-    body += b"".join(b"\x00\x01\x01" + text for text in (b"b", b"c"))
-    path = tmp_path / "x.xdf"
-    path.write_bytes(
-        b"XDF:"
-        + pack(Tag.FILE_HEADER, b"<info><version>1.0</version></info>")
-        + pack(Tag.STREAM_HEADER, b"\x01\0\0\0" + header.xml.encode())
-        + samples_head(1, 3, len(body))
-        + body
-    )
-    stream = read_xdf(path).stream("n")
-    np.testing.assert_allclose(stream.stamps, [5.0, 5.1, 5.2])
-    np.testing.assert_allclose(load(path)["n"]["time_stamps"], stream.stamps)
-    assert [row[0] for row in stream.texts] == ["a", "b", "c"]
+    found = [float(row[0]) for row in (stream.texts if texts else stream.data)]
+    assert found == list(values)
 
 
 def test_a_file_is_read_while_it_is_written(tmp_path: Path) -> None:

@@ -60,13 +60,6 @@ def scores(row: str, draws: int, first: int = 0) -> list[Score]:
     return [score(row, first + seed, usual=True) for seed in range(draws)]
 
 
-@pytest.mark.parametrize("row", QUICK)
-def test_an_unkind_device_is_as_right_as_it_is_said_to_be(row: str) -> None:
-    (one,) = scores(row, 1)
-    assert shortcomings(one) == []
-    assert one.named == one.present
-
-
 @pytest.mark.parametrize("seed", range(1, 5))
 def test_a_slew_is_covered_that_probes_of_a_busy_computer_show_late(seed: int) -> None:
     one = score("slewed, and its computer busy", seed)
@@ -76,10 +69,12 @@ def test_a_slew_is_covered_that_probes_of_a_busy_computer_show_late(seed: int) -
     assert one.named == one.present
 
 
-@pytest.mark.parametrize("row", ROWS)
-@pytest.mark.long
-def test_every_unkind_device_is_as_right_as_it_is_said_to_be(row: str) -> None:
-    for one in scores(row, 2):
+@pytest.mark.parametrize(
+    ("row", "draws"),
+    [*((row, 1) for row in QUICK), *(pytest.param(row, 2, marks=pytest.mark.long) for row in ROWS)],
+)
+def test_an_unkind_device_is_as_right_as_it_is_said_to_be(row: str, draws: int) -> None:
+    for one in scores(row, draws):
         assert shortcomings(one) == [], one
         assert one.named == one.present
 
