@@ -36,7 +36,8 @@ class StrictModel(BaseModel):
     as by pydantic's ``use_attribute_docstrings``, by every command that imports a model.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    # A model that is a part of others is never validated alone: its own validator is not built.
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     @field_validator("*", mode="before")
     @classmethod
