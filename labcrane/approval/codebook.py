@@ -99,7 +99,7 @@ def _has(study: Study, name: str) -> bool:
     given = {
         "group": bool(protocol.design.groups),
         CONDITION: any(step.block is not None and step.block.condition for step in steps),
-        "feedback": bool(protocol.feedback),
+        "feedback": bool(protocol.switched),
         **dict.fromkeys(
             ("track", "track_level", "track_success"),
             any(step.block is not None and step.block.track for step in steps),

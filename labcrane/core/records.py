@@ -100,6 +100,8 @@ class Trial:
     start_pose
         Joint angles in rad at which a further attempt begins, since the first one did; None for
         the first.
+    active
+        Names of the feedback and the secondary tasks that are switched on.
     """
 
     number: int
@@ -107,6 +109,7 @@ class Trial:
     seed: int
     planned: PlannedTrial
     start_pose: tuple[float, ...] | None = None
+    active: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

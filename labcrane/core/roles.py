@@ -1,6 +1,7 @@
 """The roles a plugin can fill, in the order data flows through them.
 
     InputDevice -> Controller -> Dynamics -> Task        in the session's loop
+    SecondaryTask                                        beside the task
     Cue -> Feedback                                      in processes of their own
 
 Each role has exactly one method that runs every tick. The loop calls it directly, never through
@@ -177,6 +178,31 @@ class Task(Component):
 
         The experimenter's decision. It holds for this trial only.
         """
+
+
+class SecondaryTask(Component):
+    """A second task that runs beside any task: probes of attention, an n-back, tracking.
+
+    It is switched on trial by trial, as feedback is. ``begin_trial`` begins each trial in which it
+    is on. A cue or a sound presents its signals, which views and sounds have in ``frame.task`` with
+    the protocol's name before them: ``drt.stimulus``.
+    """
+
+    results: tuple[Signal, ...] = ()
+    """Its measures of a trial, with units and definitions; columns of the trial table, with the
+    protocol's name before them: ``drt_hits``."""
+
+    @abstractmethod
+    def evaluate(self, frame: Frame) -> TrialStatus:
+        """Return its values and events after this tick; the phase of the status is not used.
+
+        Not called in a pause, between trials, and while it is switched off: ``frame.tick.number``
+        shows that ticks are missing.
+        """
+
+    @abstractmethod
+    def measure(self) -> Mapping[str, Value]:
+        """Return the measures of the trial that has just ended, by the names of ``results``."""
 
 
 class Questionnaire(Component):

@@ -247,6 +247,8 @@ class Planner:
             _of_condition(condition, task.plan(levels)) if track is None else self._rounds(track)
         )
         trials = tuple(map(self._trial, planned))
+        feedback = self._feedback(switch, block.fading, trials)
+        trials = tuple(replace(each, active=feedback.get(each.number, ())) for each in trials)
         name = block.name or block.task
         return PlannedBlock(
             name,
@@ -260,7 +262,7 @@ class Planner:
             last=last,
             reference=kind == "reference",
             ask=block.ask,
-            feedback=self._feedback(switch, block.fading, trials),
+            feedback=feedback,
             track=track,
             condition=condition,
         )
@@ -307,12 +309,12 @@ class Planner:
     ) -> dict[int, tuple[str, ...]]:
         """Return each trial's active feedback; an uncounted one is like the next counted one."""
         protocol = self._study.protocol
-        if not protocol.feedback:
+        if not protocol.switched:
             return {}
         if chosen == "group":
             names = protocol.design.groups[self.group]
         elif chosen == "all":
-            names = tuple(protocol.feedback)
+            names = protocol.switched
         else:
             names = () if chosen == "none" else chosen
         on = iter(faded(sum(trial.planned.counted for trial in trials), fading))
@@ -392,4 +394,5 @@ def next_attempt(
     none are given. Otherwise the path would begin where the last attempt was cut off.
     """
     words = (study.protocol.study, plan.participant, plan.number, "trial", trial.number, attempt)
-    return Trial(trial.number, attempt, derive(*words), trial.planned, tuple(start) or None)
+    pose = tuple(start) or None
+    return replace(trial, attempt=attempt, seed=derive(*words), start_pose=pose)

@@ -162,6 +162,10 @@ class Protocol(Section):
     tasks: dict[FactorName, Use] = Field(min_length=1)
     """Tasks of the operator, by name."""
 
+    secondary: dict[FactorName, Use] = Field(default_factory=dict)
+    """Second tasks beside them, by name. Groups, conditions and blocks switch them on as they do
+    feedback."""
+
     questionnaires: dict[str, Use] = Field(default_factory=dict)
     """Questionnaires with settings, by the study's names for them. One without settings is asked
     by its own name and need not be listed."""
@@ -211,6 +215,11 @@ class Protocol(Section):
 
     expected: tuple[str, ...] = ()
     """Keys of warnings of ``labcrane check`` about settings that are intended."""
+
+    @property
+    def switched(self) -> tuple[str, ...]:
+        """Names of all that trials switch on: feedback and secondary tasks."""
+        return (*self.feedback, *self.secondary)
 
 
 def protocol_model() -> type[Protocol]:

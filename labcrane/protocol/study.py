@@ -9,7 +9,14 @@ from typing import TypeGuard
 
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.core.records import Value
-from labcrane.core.roles import Controller, Dynamics, InputDevice, Questionnaire, Task
+from labcrane.core.roles import (
+    Controller,
+    Dynamics,
+    InputDevice,
+    Questionnaire,
+    SecondaryTask,
+    Task,
+)
 from labcrane.core.settings import Settings
 from labcrane.errors import ProtocolError, meant, nearest
 from labcrane.files.complaints import written
@@ -44,7 +51,9 @@ class Study:
     choices
         All components but the operator, by the part they play: ``scheme``, ``tasks.NAME``.
     tasks
-        The tasks by the protocol's names for them, built.
+        The tasks by the protocol's names for them, built, with the secondary tasks beside them.
+    secondary
+        What runs beside the tasks, by the protocol's names.
     questionnaires
         The questionnaires by the study's names for them, built.
     cues, sounds, views
@@ -78,6 +87,7 @@ class Study:
     choices: Mapping[str, ComponentSpec]
     tasks: Mapping[str, Task]
     task_choices: Mapping[str, ComponentSpec]
+    secondary: dict[str, ComponentSpec] = field(default_factory=dict)
     questionnaires: Mapping[str, Questionnaire] = field(default_factory=dict)
     questionnaire_choices: Mapping[str, ComponentSpec] = field(default_factory=dict)
     cues: dict[str, ComponentSpec] = field(default_factory=dict)
@@ -460,8 +470,8 @@ class Checker:
 
     def _feedback_exists(self, place: Place, names: Sequence[str]) -> None:
         for at, name in enumerate(names):
-            if name not in self._protocol.feedback:
-                there = nearest(name, self._protocol.feedback, "there is")
+            if name not in self._protocol.switched:
+                there = nearest(name, self._protocol.switched, "there is")
                 self._source.problem((*place, at), f"there is no feedback {name!r}; {there}")
 
 
@@ -491,16 +501,28 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     dynamics = chooser.choose(Dynamics, ("dynamics",))
     choices = chooser.choose_several(Task, "tasks")
     tasks = chooser.build(Task, "tasks", choices, machine[0]) if machine else {}
+    cues, sounds, views = chooser.choose_feedback()
+    secondary = chooser.choose_several(SecondaryTask, "secondary")
+    for name in secondary.keys() & {*cues, *sounds, *views}:
+        source.problem(("secondary", name), f"{name!r} is already the name of a feedback", key=True)
+    if secondary and machine:
+        from labcrane.protocol.beside import Beside  # noqa: PLC0415 - it loads numpy
+
+        # Each task has its own: a component is opened once.
+        built = {
+            name: chooser.build(SecondaryTask, "secondary", secondary, machine[0]) for name in tasks
+        }
+        tasks = {name: Beside(task, built[name]) for name, task in tasks.items()}
     asked = chooser.choose_questionnaires(protocol) if protocol else {}
     questionnaires = (
         chooser.build(Questionnaire, "questionnaires", asked, machine[0]) if machine else {}
     )
-    cues, sounds, views = chooser.choose_feedback()
     if protocol is not None:
         Checker(source, protocol).check(tasks, questionnaires)
     monitors, others = chooser.choose_monitors(), chooser.choose_others()
     named: dict[str, Mapping[str, ComponentSpec]] = {
         "tasks": choices,
+        "secondary": secondary,
         "questionnaires": asked,
         "feedback": cues | sounds,
         "views": views,
@@ -536,6 +558,7 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
         choices=there,
         tasks=tasks,
         task_choices=choices,
+        secondary=secondary,
         questionnaires=questionnaires,
         questionnaire_choices=asked,
         cues=cues,

@@ -25,6 +25,7 @@ from labcrane.core.roles import (
     Feedback,
     InputDevice,
     Questionnaire,
+    SecondaryTask,
     SignalMonitor,
     Task,
     Trigger,
@@ -60,6 +61,12 @@ def labcrane_dynamics() -> Sequence[Offer[Dynamics]]:
 @hookspec
 def labcrane_tasks() -> Sequence[Offer[Task]]:
     """Offer things for the operator to do."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_secondary() -> Sequence[Offer[SecondaryTask]]:
+    """Offer second tasks that run beside any task."""
     raise NotImplementedError
 
 
@@ -179,6 +186,14 @@ ROLES: Mapping[type[Component], RoleEntry] = {
         "task",
         "a task for the operator",
         ("tasks",),
+        several=True,
+        returns={"evaluate": Returned.JUDGEMENT},
+    ),
+    SecondaryTask: RoleEntry(
+        labcrane_secondary,
+        "secondary",
+        "a second task that runs beside any task",
+        ("secondary",),
         several=True,
         returns={"evaluate": Returned.JUDGEMENT},
     ),

@@ -33,6 +33,7 @@ from labcrane.testing.roles import (
     make_trial,
     opened,
 )
+from labcrane.testing.secondary import SecondaryTaskContract
 from labcrane.testing.tasks import TaskContract
 from labcrane.testing.triggers import TriggerContract
 
@@ -52,6 +53,7 @@ __all__ = [
     "KernelContract",
     "PluginContract",
     "QuestionnaireContract",
+    "SecondaryTaskContract",
     "SignalMonitorContract",
     "TaskContract",
     "TriggerContract",

@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from labcrane import Machine, Settings
-from labcrane.core import Names, Unit, Within, WrongKey, was_run
+from labcrane.core import Names, SignalName, Unit, Within, WrongKey, was_run
 
 MOST_OVERTONES = 15
 LOWEST_HZ, HIGHEST_HZ = 40.0, 10_000.0
@@ -69,6 +69,10 @@ class SonificationSettings(Settings):
     silent_after_s: NonNegativeFloat | None = 0.3
     """Seconds inside the target after which the tone falls silent; null keeps it sounding."""
 
+    stimulus: SignalName | None = None
+    """Stimulus of a secondary task, such as ``drt.stimulus``: the tone sounds while it is on, as
+    it sounds at the target, and does not follow the movement."""
+
     ramp_s: NonNegativeFloat = 0.015
     """Duration of a change, in seconds; shorter changes click."""
 
@@ -95,7 +99,7 @@ class SonificationSettings(Settings):
         return device
 
     def reveals(self) -> tuple[str | Within, ...]:
-        if not any(self.level):
+        if not any(self.level) or self.stimulus:
             return ()
         told: list[str | Within] = []
         if not self._is_constant:
@@ -115,7 +119,7 @@ class SonificationSettings(Settings):
         highest = many * (1 + max(self.overtones))
         if few < LOWEST_HZ or many > HIGHEST_HZ:
             found["pitch_hz"] = f"is {few:g} to {many:g} Hz, which not everybody hears"
-        elif self._is_constant:
+        elif self._is_constant and not self.stimulus:
             found["pitch_hz"] = (
                 f"is {few:g} Hz at every distance, and overtones and level do not change, so that "
                 "nothing is heard of it"

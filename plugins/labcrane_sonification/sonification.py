@@ -64,6 +64,8 @@ class Sonification(Feedback):
         self._tip = run.state.find("tip.position")
         self._target = run.task.find("target.position")
         self._radius = run.task.find("target.radius")
+        stimulus = self._settings.stimulus
+        self._stimulus = None if stimulus is None else run.task.index(stimulus)
         made, by_jack = self._make_server(self._settings), self._settings.driver == "jack"
         live = by_jack and self._make_server is server
         self._scheduling = real_time.follow() if live else "ordinary"
@@ -105,6 +107,9 @@ class Sonification(Feedback):
 
     def tone(self, frame: Frame) -> Tone | None:
         """Return the tone for a frame that follows those presented; None without a target."""
+        if self._stimulus is not None:
+            at_target = tone(self._settings, 0.0, 0.0, 0.0)
+            return at_target if frame.task[self._stimulus] > 0.0 else None
         way = frame.task[self._target] - frame.state[self._tip]
         distance = float(np.linalg.norm(way))
         if math.isnan(distance):

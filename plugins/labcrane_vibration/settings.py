@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from labcrane import Machine, Settings
-from labcrane.core import Names, Unit, Within, WrongKey
+from labcrane.core import Names, SignalName, Unit, Within, WrongKey
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Degrees = Annotated[float, Field(ge=-180.0, le=180.0)]
@@ -70,6 +70,10 @@ class VibrationSettings(Settings):
     silent_after_s: NonNegativeFloat | None = 0.3
     """Seconds inside the target after which the vibration stops; null lets it go on."""
 
+    stimulus: SignalName | None = None
+    """Stimulus of a secondary task, such as ``drt.stimulus``: all tactors vibrate with the
+    amplitude at the target while it is on, and do not follow the movement."""
+
     at_most: Share = 1.0
     """Largest amplitude that a participant may be given; a larger ``amplitude`` is refused."""
 
@@ -78,7 +82,7 @@ class VibrationSettings(Settings):
     and ``feedback_lost`` decides."""
 
     def reveals(self) -> tuple[str | Within, ...]:
-        if not any(self.amplitude):
+        if not any(self.amplitude) or self.stimulus:
             return ()
         told: list[str | Within] = []
         if not self._is_constant:
@@ -96,7 +100,7 @@ class VibrationSettings(Settings):
         found = {}
         if not any(self.amplitude):
             found["amplitude"] = "is 0 at every distance: nothing is felt"
-        elif self._is_constant and not self._directions:
+        elif self._is_constant and not self._directions and not self.stimulus:
             found["amplitude"] = (
                 f"is {self.amplitude[0]:g} at every distance, and pulse_hz does not change, so "
                 "that nothing is felt of it"

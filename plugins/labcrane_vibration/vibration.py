@@ -64,6 +64,8 @@ class Vibration(Feedback):
         self._tip = run.state.find("tip.position")
         self._target = run.task.find("target.position")
         self._radius = run.task.index("target.radius")
+        stimulus = self._settings.stimulus
+        self._stimulus = None if stimulus is None else run.task.index(stimulus)
         self._rate = run.rate_hz
         self._given = None
         self._trial = 0
@@ -138,6 +140,9 @@ class Vibration(Feedback):
 
     def _felt(self, frame: Frame) -> tuple[float, float, tuple[float, ...]]:
         """Return amplitude, pulses per second and each tactor's level, for the next frame."""
+        if self._stimulus is not None:
+            on = self._settings.amplitude[1] * float(frame.task[self._stimulus] > 0.0)
+            return on, math.nan, (on,) * len(self._settings.tactors)
         way = frame.task[self._target] - frame.state[self._tip]
         distance, now = float(np.linalg.norm(way)), frame.tick.due
         passed = 0.0 if self._last is None else now - self._last

@@ -110,7 +110,7 @@ def _of_conditions(study: Study) -> Doubts:
             "the blocks of the conditions differ in task, repeat or levels, so that a condition is "
             "tested with other trials in one position than in another",
         )
-    meant = {"all": tuple(study.protocol.feedback), "none": (), "group": ("the group's",)}
+    meant = {"all": tuple(study.protocol.switched), "none": (), "group": ("the group's",)}
     given: dict[frozenset[str], str] = {}
     for name, switch in design.conditions.items():
         feedback = switch if isinstance(switch, tuple) else meant[switch]
@@ -182,7 +182,7 @@ def _of_orders_of_blocks(study: Study) -> Doubts:
             continue
         first, other = before.setdefault(session, (at, block))
         switches = [
-            frozenset(study.protocol.feedback) if each.feedback == "all"
+            frozenset(study.protocol.switched) if each.feedback == "all"
             else frozenset() if each.feedback == "none"
             else frozenset({"group"}) if each.feedback == "group"
             else frozenset(each.feedback)

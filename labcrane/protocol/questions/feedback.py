@@ -32,19 +32,20 @@ def _of_feedback(study: Study) -> Doubts:
     used = {name for way in ways if isinstance(way, tuple) for name in way}
     if "group" in ways:
         used |= {name for names in protocol.design.groups.values() for name in names}
-    elif protocol.design.groups and protocol.feedback:
+    elif protocol.design.groups and protocol.switched:
         yield ("design", "groups"), "no block has feedback: group, so that the groups do the same"
     if "all" in ways:
         return
-    for name in protocol.feedback:
+    for name in protocol.switched:
         if name not in used:
-            yield ("feedback", name), f"feedback {name!r} is never switched on"
+            key = "secondary" if name in protocol.secondary else "feedback"
+            yield (key, name), f"{key} {name!r} is never switched on"
 
 
 @asks
 def _of_what_nobody_sees(study: Study) -> Doubts:
     """Question cues that no view draws for the operator, and feedback called as a switch is."""
-    for name in study.protocol.feedback:
+    for name in study.protocol.switched:
         if name in SWITCHES:
             yield (
                 ("feedback", name),
@@ -104,9 +105,9 @@ def _audiences(study: Study) -> Iterator[Sequence[str]]:
 @asks
 def _of_silent_blocks(study: Study) -> Doubts:
     """Question that every group gets all feedback because a block does not specify any."""
-    if not (study.protocol.design.groups and study.protocol.feedback):
+    if not (study.protocol.design.groups and study.protocol.switched):
         return
-    all_of_it = ", ".join(study.protocol.feedback)
+    all_of_it = ", ".join(study.protocol.switched)
     for number, session in enumerate(study.protocol.sessions):
         for at, step in enumerate(session.steps):
             if step.block is None or step.block.condition is not None:
@@ -132,7 +133,7 @@ def _of_what_groups_are_not_given(study: Study) -> Doubts:
         if block.feedback in ("group", "none") or "feedback" not in block.model_fields_set:
             continue
         kind = study.protocol.sessions[int(place[1])].steps[int(place[3])].kind
-        named = study.protocol.feedback if block.feedback == "all" else block.feedback
+        named = study.protocol.switched if block.feedback == "all" else block.feedback
         told = {
             name: [repr(group) for group, given in groups.items() if name not in given]
             for name in named
@@ -150,7 +151,7 @@ def _of_what_groups_are_not_given(study: Study) -> Doubts:
 @asks
 def _of_what_is_told(study: Study) -> Doubts:
     """Question groups, conditions and blocks that give different facts in different forms."""
-    design, everything = study.protocol.design, tuple(study.protocol.feedback)
+    design, everything = study.protocol.design, tuple(study.protocol.switched)
     meant = {"all": everything, "none": (), "group": ()}
     conditions = {
         name: switch if isinstance(switch, tuple) else meant[switch]
@@ -178,7 +179,8 @@ def _of_what_is_told(study: Study) -> Doubts:
 
 
 def _facts(study: Study, feedback: Sequence[str]) -> Facts:
-    parts, told = {**study.cues, **study.sounds}, dict[str, float]()
+    parts = {**study.cues, **study.sounds, **study.secondary}
+    told = dict[str, float]()
     for name in feedback:
         for each in parts[name].settings.reveals():
             fact, far = (each.fact, each.far) if isinstance(each, Within) else (each, math.inf)
