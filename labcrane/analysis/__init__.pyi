@@ -24,6 +24,7 @@ from .presented import PRESENTED, presentation_failed
 from .questionnaires import answers_of, asked_in, beside_trials, scores_of
 from .tables.annotations import annotations_of
 from .tables.dataset import Dataset, open_dataset
+from .tables.responses import measures_by, responses, responses_of
 
 __all__ = [
     "EEG_READERS",
@@ -51,11 +52,14 @@ __all__ = [
     "gaze_space",
     "glass_of",
     "levels_of",
+    "measures_by",
     "measures_of",
     "monitor_setting",
     "movements_of",
     "open_dataset",
     "presentation_failed",
+    "responses",
+    "responses_of",
     "sampled",
     "scores_of",
     "to_mne",

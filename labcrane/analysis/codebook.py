@@ -9,6 +9,7 @@ from labcrane.analysis.presented import PRESENTED
 from labcrane.analysis.questionnaires import ANSWERS, MEANING, SCORES, score_column
 from labcrane.analysis.statistics.mixed import TIMES
 from labcrane.analysis.tables.definitions import MEASURES
+from labcrane.analysis.tables.responses import MEANING as RESPONSES
 from labcrane.core.items import Item
 from labcrane.files.yaml import parse_yaml
 from labcrane.recording.frame_log import LOOP
@@ -63,6 +64,8 @@ def codebook_of(participant: Participant, measures: "pd.DataFrame") -> "pd.DataF
             about = {f"{name}.{column}": ("", meaning) for column, meaning in columns.items()}
             rows += _described(table, about, WRITTEN)
     rows += _described("fixations", fixations, MEASURED)
+    keys = {name: who[name] for name in ("participant", "status", "session")}
+    rows += _described("responses", keys | RESPONSES, MEASURED)
     for session in sessions:
         rows += _of_streams(session)
     book = pd.DataFrame(rows, columns=list(COLUMNS))

@@ -23,9 +23,19 @@ from labcrane.analysis.movements import (
 )
 from labcrane.analysis.presented import presented
 from labcrane.analysis.quality import OF_AIMING, without_onset
-from labcrane.analysis.sticks import coordination, effort, limit_hits, reversals, stick_use
+from labcrane.analysis.sticks import (
+    coordination,
+    effort,
+    inceptor_use,
+    limit_hits,
+    prediction_errors,
+    reversals,
+    steering_entropy,
+    stick_use,
+)
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.analysis.tables.measure_cache import kept
+from labcrane.analysis.tables.responses import STIMULUS, in_trials, responses
 from labcrane.analysis.unusable import Unusable
 from labcrane.machines.machine import Machine
 from labcrane.recording.participant_file.reader import SessionRecord
@@ -50,6 +60,8 @@ class MeasureSettings:
         Last words of the names of axes that are sticks.
     hysteresis
         Change of an axis that makes a reversal, as a fraction of full scale.
+    rate_window_s, moving_rate, stick_highest_hz
+        Of :func:`~labcrane.analysis.sticks.inceptor_use`: window, least rate, highest frequency.
     sparc_highest_hz, sparc_least
         Of :func:`~labcrane.analysis.kinematics.smoothness.sparc`.
     low_pass_hz
@@ -76,6 +88,9 @@ class MeasureSettings:
     dead_zone: float = 0.05
     stick_axes: tuple[str, ...] = ("x", "y")
     hysteresis: float = 0.02
+    rate_window_s: float = 0.1
+    moving_rate: float = 0.1
+    stick_highest_hz: float = 10.0
     sparc_highest_hz: float = 10.0
     sparc_least: float = 0.05
     low_pass_hz: float = 6.0
@@ -177,10 +192,12 @@ def measure_session(
     rate_hz = float(session.attrs["rate_hz"])
     seen = looks(session, settings.display_delay_s, settings.gaze_stream, settings.gaze_eye)
     rows, recorded = [], []
+    errors: list[FloatArray] = []
     for each in cut(frames, trials, rate_hz) if frames else movements_of(session):
         movement = by_todays_rule(each, session)
         row = measure(movement, machine, settings)
         recorded.append(movement.row)
+        errors.append(_errors(movement, settings))
         span = movement.span
         if seen is not None and span is not None:
             due = movement.due
@@ -190,12 +207,16 @@ def measure_session(
             )  # fmt: skip
         rows.append(row)
     measured = pd.DataFrame(rows, index=trials.index)
+    usual = float(np.quantile(np.abs(np.concatenate(errors)), 0.9)) if any(map(len, errors)) else 0
+    measured["steering_entropy"] = [steering_entropy(each, usual) for each in errors]
     if seen is not None and seen.eyes:
         measured[GAZE_EYES] = seen.eyes
     if measured["measured_anew"].any():
         told = {name: [row.get(name, np.nan) for row in recorded] for name in ANEW}
         there = {name: told[name] for name in ANEW if any(name in row for row in recorded)}
         trials = trials.assign(**there)
+    if (session.events["name"] == STIMULUS).any():
+        trials = in_trials(trials, responses(session, settings.display_delay_s))
     shown = presented(session)
     return pd.concat([ordered(trials), measured, shown], axis=1)
 
@@ -285,26 +306,57 @@ def _along(movement: Movement, tip: FloatArray) -> float:
     return float((tip[-1] - tip[0]) @ axis / np.linalg.norm(axis))
 
 
-OF_STICKS = ("reversals", "simultaneous", "axes_used", "bimanual")
+OF_STICKS = (
+    "reversals",
+    "simultaneous",
+    "axes_used",
+    "bimanual",
+    "duty_cycle",
+    "aggressiveness",
+    "stick_power",
+    "stick_centroid",
+)
 """Measures of sticks, whatever their number."""
 
 
-def _sticks(movement: Movement, span: slice, settings: MeasureSettings) -> dict[str, float]:
-    axes = {
+def _axes(movement: Movement, span: slice, settings: MeasureSettings) -> dict[str, FloatArray]:
+    return {
         name: values[span]
         for name, values in movement.axes.items()
         if name.rpartition(".")[2] in settings.stick_axes
     }
+
+
+def _errors(movement: Movement, settings: MeasureSettings) -> FloatArray:
+    """Return the errors of prediction of all its stick axes."""
+    axes = _axes(movement, movement.span, settings) if movement.span else {}
+    found = [prediction_errors(values, movement.rate_hz) for values in axes.values()]
+    return np.concatenate(found) if found else np.empty(0)
+
+
+def _sticks(movement: Movement, span: slice, settings: MeasureSettings) -> dict[str, float]:
+    axes = _axes(movement, span, settings)
     if not axes:  # keys, or a panel whose axes are called otherwise
         return dict.fromkeys(OF_STICKS, float("nan"))
     seconds = (span.stop - span.start) / movement.rate_hz
     use = stick_use(axes, settings.dead_zone)
+    worked = inceptor_use(
+        axes,
+        movement.rate_hz,
+        window_s=settings.rate_window_s,
+        least_rate=settings.moving_rate,
+        highest_hz=settings.stick_highest_hz,
+    )
     turns = sum(reversals(values, settings.hysteresis) for values in axes.values())
     found = {
         "reversals": turns / seconds,
         "simultaneous": use.simultaneous,
         "axes_used": use.axes,
         "bimanual": use.bimanual,
+        "duty_cycle": worked.duty_cycle,
+        "aggressiveness": worked.aggressiveness,
+        "stick_power": worked.power,
+        "stick_centroid": worked.centroid,
     }
     hands = [_deflection(axes, stick) for stick in sorted({n.rpartition(".")[0] for n in axes})]
     if len(hands) == 2:  # noqa: PLR2004 - a pair of hands

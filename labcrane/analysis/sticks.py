@@ -144,3 +144,137 @@ def limit_hits(angles: FloatArray, limits: FloatArray, tolerance: float) -> int:
     at = (angles <= limits[:, 0] + tolerance) | (angles >= limits[:, 1] - tolerance)
     before = np.vstack([np.zeros((1, at.shape[1]), bool), at[:-1]])
     return int((at & ~before).sum())
+
+
+def stick_rates(axis: FloatArray, rate_hz: float, window_s: float) -> FloatArray:
+    """Return how fast an axis moves around each sample, in full scales per second, shape ``(n,)``.
+
+    It is the change over a window, which is shorter at both ends. A rate from one sample to the
+    next would grow with the sampling rate wherever the axis has steps.
+    """
+    times = np.arange(len(axis)) / rate_hz
+    before = np.maximum(times - window_s / 2.0, 0.0)
+    after = np.minimum(times + window_s / 2.0, times[-1])
+    change = np.interp(after, times, axis) - np.interp(before, times, axis)
+    rates: FloatArray = change / (after - before)
+    return rates
+
+
+@dataclass(frozen=True, slots=True)
+class InceptorUse:
+    """How much a pilot or operator works a stick.
+
+    Attributes
+    ----------
+    duty_cycle
+        Fraction of the time in which any axis moves faster than a limit. After the duty cycle of
+        pilot inceptor workload (Hanson et al. 2014, NASA/TM, Complexity and pilot workload metrics
+        for the evaluation of adaptive flight controls on a full scale piloted aircraft), with the
+        rate of :func:`stick_rates`.
+    aggressiveness
+        Root mean square of the rate of all axes together, in full scales per second. After the
+        aggressiveness of the same report, which measures deflection and rate in its own units.
+    power
+        Variance of all axes together up to the highest frequency.
+    centroid
+        Mean frequency of that power in Hz; NaN where nothing moves, or where the sampling rate is
+        less than twice the highest frequency.
+    """
+
+    duty_cycle: float
+    aggressiveness: float
+    power: float
+    centroid: float
+
+
+def inceptor_use(
+    axes: Mapping[str, FloatArray],
+    rate_hz: float,
+    *,
+    window_s: float,
+    least_rate: float,
+    highest_hz: float,
+) -> InceptorUse:
+    """Return how much the sticks were worked.
+
+    Parameters
+    ----------
+    axes
+        By name, shape ``(n,)`` each.
+    window_s
+        Of :func:`stick_rates`.
+    least_rate
+        Rate from which on an axis moves, in full scales per second.
+    highest_hz
+        Highest frequency that hands make.
+    """
+    values = np.array(list(axes.values()))
+    rates = np.array([stick_rates(each, rate_hz, window_s) for each in values])
+    power, centroid = _spectrum(values, rate_hz, highest_hz)
+    return InceptorUse(
+        duty_cycle=float((np.abs(rates) > least_rate).any(axis=0).mean()),
+        aggressiveness=float(np.sqrt((rates**2).sum(axis=0).mean())),
+        power=power,
+        centroid=centroid,
+    )
+
+
+def _spectrum(values: FloatArray, rate_hz: float, highest_hz: float) -> tuple[float, float]:
+    """Return power and mean frequency of a periodogram with a Hann window."""
+    if rate_hz < 2.0 * highest_hz:
+        return float("nan"), float("nan")
+    count = values.shape[1]
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(count) / count)
+    mean = (values * window).sum(axis=1, keepdims=True) / window.sum()  # no leak from the mean
+    spectrum = np.abs(np.fft.rfft((values - mean) * window, axis=1)) ** 2
+    spectrum[:, 1 : (count + 1) // 2] *= 2.0
+    power = spectrum.sum(axis=0) / (count * (window**2).sum())
+    frequency = np.fft.rfftfreq(count, 1.0 / rate_hz)
+    own = frequency <= highest_hz
+    total = float(power[own].sum())
+    return total, float(frequency[own] @ power[own]) / total if total > 0.0 else float("nan")
+
+
+STEP_S = 0.15
+"""Time between the samples of steering entropy."""
+
+BINS = np.array([-5.0, -2.5, -1.0, -0.5, 0.5, 1.0, 2.5, 5.0])
+"""Edges of its nine bins, in 90th percentiles of the error."""
+
+FEWEST_ERRORS = 10
+"""With fewer errors of prediction there is no entropy of a movement."""
+
+
+def prediction_errors(axis: FloatArray, rate_hz: float) -> FloatArray:
+    """Return by how much an axis differs from its prediction, every 0.15 s.
+
+    The prediction is a Taylor series of second order from the three samples before (Nakayama,
+    Futami, Nakamura and Boer 1999, SAE 1999-01-0892).
+    """
+    times = np.arange(0.0, (len(axis) - 1) / rate_hz, STEP_S)
+    a = np.interp(times, np.arange(len(axis)) / rate_hz, axis)
+    if len(a) < 4:  # noqa: PLR2004 - three samples and the one that they predict
+        return np.empty(0)
+    speed = a[1:] - a[:-1]
+    predicted = a[2:-1] + speed[1:-1] + 0.5 * (speed[1:-1] - speed[:-2])
+    errors: FloatArray = a[3:] - predicted
+    return errors
+
+
+def steering_entropy(errors: FloatArray, usual: float) -> float:
+    """Return the entropy of errors of prediction, 0 for predictable to 1.
+
+    Boer's steering entropy of a stick (Nakayama et al. 1999; Boer 2000, Proceedings of the Human
+    Factors and Ergonomics Society 44): nine bins, logarithm to base nine.
+
+    Parameters
+    ----------
+    usual
+        90th percentile of the absolute errors of the reference: here of all movements of the
+        session. Entropies of two sessions cannot be compared if their references differ.
+    """
+    if len(errors) < FEWEST_ERRORS or not usual > 0.0:
+        return float("nan")
+    counts = np.bincount(np.searchsorted(BINS * usual, errors), minlength=len(BINS) + 1)
+    shares = counts[counts > 0] / len(errors)
+    return float(-(shares * np.log(shares)).sum() / np.log(len(BINS) + 1)) + 0.0

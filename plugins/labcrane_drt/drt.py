@@ -31,6 +31,7 @@ class Drt(SecondaryTask):
         Signal("held", "1", definition="stimuli that an interruption ended; they do not count"),
         Signal("hit_rate", "1", definition="hits divided by hits and misses; cheats are left out"),
         Signal("response_time", "s", definition="mean response time of the hits"),
+        Signal("median_response_time", "s", definition="median response time of the hits"),
     )
 
     def __init__(self, settings: DrtSettings) -> None:
@@ -96,6 +97,7 @@ class Drt(SecondaryTask):
             "held": len(found["held"]),
             "hit_rate": hits / (hits + misses) if hits + misses else None,
             "response_time": float(np.mean(found["hit"])) if hits else None,
+            "median_response_time": float(np.median(found["hit"])) if hits else None,
         }
 
     def _pressed(self, axes: FloatArray) -> bool:

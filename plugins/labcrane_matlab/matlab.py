@@ -21,6 +21,7 @@ from labcrane.analysis import (
     codebook_of,
     events_of,
     measures_of,
+    responses_of,
     scores_of,
 )
 from labcrane.recording import SessionRecord, Stream
@@ -81,6 +82,7 @@ class Matlab(Exporter):
             "trials": columns(measures, self._trials),
             "questionnaires": columns(answers_of(participant)),
             "scores": columns(scores_of(participant)),
+            "responses": columns(responses_of(participant)),
             "units": _units(dict(zip(trials["column"], trials["unit"], strict=True)), self._trials),
             "sessions": _cells(
                 [self._session(number, record) for number, record in participant.sessions()]

@@ -10,6 +10,7 @@ from labcrane.core import Kernel, Layout, Phase, Places, Value, compiled
 from labcrane_operator import law
 from labcrane_operator.aimer import STILL, Aimer
 from labcrane_operator.noise import Noise
+from labcrane_operator.responder import Responder
 from labcrane_operator.settings import CONNECTED, STICK, OperatorSettings
 
 RUNNING = Phase.RUNNING  # Python 3.11 takes long to find it there in every tick; 3.12 does not
@@ -50,6 +51,7 @@ class SimulatedOperator(InputDevice):
         self._pace = 1.0
         self._trial = 0
         self._aimer: Aimer | None = None
+        self._responder: Responder | None = None
 
     def open(self, run: Run) -> None:
         self._run = run
@@ -59,16 +61,37 @@ class SimulatedOperator(InputDevice):
         if self._shown:
             self._target = run.task.find("target.position")
             self._radius = run.task.index("target.radius")
+        response, axes = self._settings.response, Layout("the operator", self.signals)
+        if response is not None:
+            self._button = axes.index(response.button)
+            hands = [at for at, name in enumerate(axes.columns) if self._steers(name)]
+            stimulus = run.task.index(response.to)
+            self._responder = Responder(response, stimulus, hands, run.rate_hz)
         person = np.random.default_rng(run.participant_seed)
         self._pace = math.exp(self._settings.pace_sd * float(person.standard_normal()))
 
     def begin_trial(self, trial: Trial) -> None:
         settings, dt = self._settings, 1.0 / self._run.rate_hz
         gain = settings.learning_gain * math.exp(-settings.learning_rate * (trial.number - 1))
-        self._aimer = Aimer(settings, Noise(trial.seed), self._pace * (1.0 + gain), dt)
+        pace, response = self._pace * (1.0 + gain), settings.response
+        if response is not None and self._responder is not None:
+            self._responder.begin_trial(trial.seed)
+            if response.to.partition(".")[0] in trial.active:
+                pace *= 1.0 + response.cost
+        self._aimer = Aimer(settings, Noise(trial.seed), pace, dt)
         self._trial = trial.number
 
     def read(self, tick: Tick, seen: Frame) -> FloatArray:
+        out = self._steer(seen)
+        if self._responder is not None:
+            out[self._button] = float(self._responder.pressing(seen))
+        return out
+
+    def _steers(self, name: str) -> bool:
+        part = name.rpartition(".")[2]
+        return name in self._settings.axes if self._settings.axes else part in {"x", "y"}
+
+    def _steer(self, seen: Frame) -> FloatArray:
         aimer, out = self._aimer, self._out
         out[:] = self._rest
         if aimer is None or not self._sees(seen):  # values of the last trial are not a target
@@ -94,7 +117,7 @@ class SimulatedOperator(InputDevice):
         return {"simulated": True, "pace": self._pace}
 
     def kernel(self) -> Kernel | None:
-        if not self._shown:
+        if not self._shown or self._responder is not None:
             return None
         own = np.zeros(law.DRAWN + 3 * law.BLOCK)
         own[law.LEFT_ON : law.ASKED] = (

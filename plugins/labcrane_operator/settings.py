@@ -13,12 +13,41 @@ from pydantic import (
 )
 
 from labcrane import Machine, Settings
-from labcrane.core import ButtonName, InputAxis, Names, Once, Usual, WrongKey
+from labcrane.core import ButtonName, InputAxis, Names, Once, SignalName, Usual, WrongKey
 
 CONNECTED = "operator.connected"
 """Axis that reports that the operator is connected, if it has no joysticks."""
 
 STICK = ("x", "y", "twist", "slider", "trigger", "connected")
+
+
+class ResponseSettings(Settings):
+    """How the operator responds to the stimuli of a secondary task, and what that costs."""
+
+    to: SignalName
+    """The stimulus: ``drt.stimulus``."""
+
+    button: InputAxis = "left.trigger"
+    """Axis of the input that the operator presses."""
+
+    median_s: PositiveFloat = 0.4
+    """Median response time with the hands at rest, in seconds."""
+
+    sd: NonNegativeFloat = 0.25
+    """Standard deviation of the logarithm of the response time."""
+
+    lapse_rate: float = Field(default=0.03, ge=0.0, le=1.0)
+    """Probability that a stimulus is not noticed with the hands at rest."""
+
+    load: NonNegativeFloat = 1.0
+    """How much longer the response takes, and how much more often a stimulus is not noticed, with
+    the hands fully deflected, as a fraction."""
+
+    cost: NonNegativeFloat = 0.1
+    """How much longer the movements of a trial with the secondary task take, as a fraction."""
+
+    press_s: PositiveFloat = 0.1
+    """How long the button is pressed, in seconds."""
 
 
 class OperatorSettings(Settings):
@@ -95,6 +124,9 @@ class OperatorSettings(Settings):
 
     button: ButtonName | None = None
     """The button that the operator presses, if ``axes`` is given; none by default."""
+
+    response: ResponseSettings | None = None
+    """How the operator responds to a secondary task; null: not at all."""
 
     @field_validator("axes")
     @classmethod

@@ -20,6 +20,7 @@ from labcrane.analysis import (
     fixations_of,
     measures_of,
     presentation_failed,
+    responses_of,
     scores_of,
     with_unseen_areas,
 )
@@ -48,6 +49,7 @@ class Tables(Exporter):
     ``questionnaires``   one row per answer
     ``scores``           one row per score of a questionnaire
     ``fixations``        one row per point at which the eye tracker was checked, where it was
+    ``responses``        one row per stimulus of a detection response task, where there was one
     ``streams/``         one file per participant, session and stream, one row per tick
     ``codebook.csv``     unit, meaning, source, type and planned levels of every column
     ===================  ==============================================================
@@ -63,6 +65,7 @@ class Tables(Exporter):
 
         (folder / "streams").mkdir()
         people, trials, answers, scores, marks, looked_at = [], [], [], [], [], []
+        responded = []
         names = Names()
         book = Codebook(names)
         events = _Growing(folder / "events")
@@ -74,12 +77,17 @@ class Tables(Exporter):
             answers.append(answers_of(participant))
             marks.append(annotations_of(participant))
             looked_at.append(fixations_of(participant))
+            responded.append(responses_of(participant))
             scores.append(scores_of(participant))
             for number, session in participant.sessions():
                 events.add(_events(participant, number, session))
                 self._streams(participant, number, session, folder / "streams", book)
         book.has("events", events.close())
-        for name, tables in (("annotations", marks), ("fixations", looked_at)):
+        for name, tables in (
+            ("annotations", marks),
+            ("fixations", looked_at),
+            ("responses", responded),
+        ):
             if any(map(len, tables)):
                 book.has(name, write_csv(joined(tables), folder / f"{name}.csv"))
         seen = with_unseen_areas(joined(trials))

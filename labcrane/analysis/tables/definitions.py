@@ -43,6 +43,18 @@ MEASURES: Mapping[str, tuple[str, str]] = {
     "simultaneous": ("1", "fraction of the movement time with two or more axes in use"),
     "axes_used": ("1", "mean number of axes in use"),
     "bimanual": ("1", "of the time with a stick in use, the fraction with more than one"),
+    "duty_cycle": ("1", "fraction of the movement time in which a stick axis moves"),
+    "aggressiveness": (
+        "1/s",
+        "root mean square of the rate of all stick axes together, in full scales per second",
+    ),
+    "stick_power": ("1", "variance of all stick axes together, up to 10 Hz"),
+    "stick_centroid": ("Hz", "mean frequency of that power"),
+    "steering_entropy": (
+        "1",
+        "entropy of the errors of a prediction of the stick axes, 0 to 1; compared with all "
+        "movements of the session",
+    ),
     "coordination": (
         "1",
         "largest cross-correlation of both sticks' deflections, up to half a second apart",
