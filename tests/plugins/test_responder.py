@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labcrane.core import Signal
+from labcrane import Signal
 from labcrane.core.clock import Tick
 from labcrane.testing import ch8, make_frame, make_run
 from labcrane_operator.responder import Responder
