@@ -1,7 +1,7 @@
 """Steps of a session, as a protocol writes them."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
     ConfigDict,
@@ -112,6 +112,12 @@ class Fixation(Section):
     """Where they are, as shares of the picture's width and height from its upper left corner."""
 
 
+StepKind = Literal[
+    "consent", "instructions", "questionnaire", "fixation", "practice", "reference", "block",
+    "break",
+]  # fmt: skip
+STEPS: tuple[str, ...] = get_args(StepKind)
+
 TIMED: Mapping[str, type[Break | Fixation]] = {"break": Break, "fixation": Fixation}
 """Steps that last for as long as they say."""
 
@@ -119,10 +125,7 @@ TIMED: Mapping[str, type[Break | Fixation]] = {"break": Break, "fixation": Fixat
 class Step(Section):
     """One step of a session, with what kind it is and what it needs."""
 
-    kind: Literal[
-        "consent", "instructions", "questionnaire", "fixation", "practice", "reference", "block",
-        "break",
-    ]  # fmt: skip
+    kind: StepKind
     text: str = ""
     file: str = ""
     block: Block | None = None
@@ -192,12 +195,6 @@ def read_sessions(source: YamlFile) -> Any:
         whole = [{"kind": "break"} if step is None else step for step in parsed]
         found.append({**session, "steps": whole})
     return found
-
-
-STEPS = (
-    "consent", "instructions", "questionnaire", "fixation", "practice", "reference", "block",
-    "break",
-)  # fmt: skip
 
 
 def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:

@@ -75,7 +75,7 @@ def read_annotations(folder: Path, session: int) -> list[Annotation]:
     marks: dict[int, Annotation] = {}
     for number, line in enumerate(_lines(path), start=1):
         try:
-            said = _mapping(line)
+            said = mapping_in(line)
             if "withdraws" in said:
                 del marks[int(said["withdraws"])]
             else:
@@ -195,7 +195,8 @@ def _lines(path: Path) -> Iterator[str]:
     yield from text.removesuffix("\n").split("\n") if text else ()
 
 
-def _mapping(line: str) -> dict[str, Any]:
+def mapping_in(line: str) -> dict[str, Any]:
+    """Return the mapping that a JSON text holds."""
     said = json.loads(line)
     if not isinstance(said, dict):
         raise TypeError(f"{line[:40]!r} is not a mapping of names")

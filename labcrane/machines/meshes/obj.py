@@ -13,6 +13,7 @@ from labcrane.machines.meshes.surface import (
     check_corners,
     check_triangles,
     fans,
+    floats,
 )
 from labcrane.types import FloatArray
 
@@ -44,7 +45,7 @@ def read_obj(data: bytes) -> Surface:
             # A point may have a weight or a colour behind it.
             if len(words) < 4 or (first == b"vn" and len(words) > 4):  # noqa: PLR2004 - x, y, z
                 raise MeshError(f"has a point or normal without three numbers in line {number}")
-            (points if first == b"v" else normals).extend(_floats(words[1:4], number))
+            (points if first == b"v" else normals).extend(floats(words[1:4], number))
         elif first == b"f":
             triangles += len(words) - 3
             check_triangles(triangles)
@@ -94,13 +95,6 @@ def _lines(data: bytes) -> Iterator[tuple[int, list[bytes]]]:
         if whole := [word for word in (*begun, *words) if word]:
             yield number, whole
         begun = []
-
-
-def _floats(words: list[bytes], number: int) -> list[float]:
-    try:
-        return [float(word) for word in words]
-    except ValueError as error:
-        raise MeshError(f"has a value that is not a number in line {number}") from error
 
 
 def _corner(word: bytes, number: int, points: int, normals: int) -> tuple[int, int]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from labcrane.machines.meshes.surface import MeshError, Surface, check_triangles, doubles
+from labcrane.machines.meshes.surface import MeshError, Surface, check_triangles, doubles, floats
 
 HEAD = 84
 """Bytes before the first triangle: a title of 80, and how many there are."""
@@ -58,7 +58,7 @@ def _written(data: bytes) -> Surface:
                 raise MeshError(f"has no {' '.join((first, second)).strip()} in line {number}")
         if first in {"facet", "vertex"}:
             numbers = normals if first == "facet" else points
-            numbers += _floats(words[-3:], number)
+            numbers += floats(words[-3:], number)
         at = (at + 1) % len(FACET)
         check_triangles(len(normals) // 3)
     if inside:
@@ -70,10 +70,3 @@ def _lines(data: bytes) -> Iterator[tuple[int, list[str]]]:
     for number, line in enumerate(data.decode("latin-1").split("\n"), start=1):
         if words := line.split():
             yield number, words
-
-
-def _floats(words: list[str], number: int) -> list[float]:
-    try:
-        return [float(word) for word in words]
-    except ValueError as error:
-        raise MeshError(f"has a value that is not a number in line {number}") from error

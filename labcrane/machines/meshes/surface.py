@@ -47,6 +47,14 @@ def doubles(numbers: npt.ArrayLike) -> FloatArray:
         return np.asarray(numbers).astype(np.float64)
 
 
+def floats(words: Sequence[str] | Sequence[bytes], line: int) -> list[float]:
+    """Return the numbers that words of a line are, or raise :class:`MeshError`."""
+    try:
+        return [float(word) for word in words]
+    except ValueError as error:
+        raise MeshError(f"has a value that is not a number in line {line}") from error
+
+
 def check_corners(corners: Corners, count: int) -> None:
     """Raise :class:`MeshError` where a corner is not one of ``count`` points."""
     if corners.size and (corners.min() < 0 or corners.max() >= count):

@@ -1,6 +1,5 @@
 """Reader of a participant file, for analysis."""
 
-import json
 import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.errors import OutdatedRecordingWarning, RecordingError
-from labcrane.recording.annotations import COLUMNS, read_annotations
+from labcrane.recording.annotations import COLUMNS, mapping_in, read_annotations
 from labcrane.recording.journal import GROUPS
 from labcrane.recording.participant_file.columns import CHUNK, holds_texts, text_of, texts_of
 from labcrane.recording.participant_file.recover import backlog
@@ -332,7 +331,7 @@ class SessionRecord:
             group = file[f"{self._group}/events"]
             columns = ("time", "tick", "part", "trial", "name", "data")
             table = {name: _values(group[name]) for name in columns}
-            table["data"] = [_mapping(text) for text in table["data"]]
+            table["data"] = [mapping_in(text) for text in table["data"]]
             return pd.DataFrame(table)
 
     @property
@@ -398,7 +397,7 @@ class SessionRecord:
 
     def _json(self, name: str) -> dict[str, Any]:
         with reading(self._path) as file:
-            return _mapping(text_of(file[f"{self._group}/{name}"]))
+            return mapping_in(text_of(file[f"{self._group}/{name}"]))
 
     def _text(self, name: str) -> str:
         with reading(self._path) as file:
@@ -486,13 +485,6 @@ def session_in(group: "h5py.Group") -> Iterator[SessionRecord]:
     path = Path(group.file.filename)
     with held(path, group.file):
         yield SessionRecord(_attributes(group), path, group.name.removeprefix("/"))
-
-
-def _mapping(text: str) -> dict[str, Any]:
-    content = json.loads(text)
-    if not isinstance(content, dict):
-        raise TypeError(f"{text[:40]!r} is not a mapping of names")
-    return content
 
 
 def _attributes(node: "h5py.HLObject") -> dict[str, Any]:

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane import RecordingError
 from labcrane_dmd.fit.fitting import LAGS, curve_at
 from labcrane_dmd.fit.recordings import SegmentRecording
-from labcrane_dmd.fit.validation import Level
+from labcrane_dmd.fit.validation import Level, of_segments
 from labcrane_dmd.model.interpolation import FULL
 from labcrane_dmd.model.model import Model, SegmentModel
 from labcrane_dmd.model.output import written
@@ -81,12 +80,7 @@ def draw_speeds(model: Model, recordings: Sequence[SegmentRecording], path: Path
     RecordingError
         A segment of the model was not recorded.
     """
-    named = {recording.name: recording for recording in recordings}
-    if missing := [name for name in model if name not in named]:
-        raise RecordingError(
-            f"there is no recording of {', '.join(missing)}, which the model has; there is "
-            f"{', '.join(named)}"
-        )
+    named = of_segments(model, recordings)
     figure = _figure(4.5 * len(model), 4.5)
     panels = figure.subplots(1, len(model), squeeze=False)[0]
     for axes, (name, segment) in zip(panels, model.items(), strict=True):

@@ -61,6 +61,19 @@ class Level:
         }
 
 
+def of_segments(
+    model: Model, recordings: Sequence[SegmentRecording]
+) -> dict[str, SegmentRecording]:
+    """Return recordings by their segments; raise :class:`RecordingError` where one is missing."""
+    named = {recording.name: recording for recording in recordings}
+    if missing := [name for name in model if name not in named]:
+        raise RecordingError(
+            f"there is no recording of {', '.join(missing)}, which the model has; there are "
+            f"recordings of {', '.join(named)}"
+        )
+    return named
+
+
 def validate(model: Model, recordings: Sequence[SegmentRecording]) -> tuple[Level, ...]:
     """Compare a model with the recordings at its validation signals, in both directions and at 0.
 
@@ -69,12 +82,7 @@ def validate(model: Model, recordings: Sequence[SegmentRecording]) -> tuple[Leve
     RecordingError
         A recording of a segment, or one of the signals, is missing.
     """
-    named = {recording.name: recording for recording in recordings}
-    if missing := [name for name in model if name not in named]:
-        raise RecordingError(
-            f"there is no recording of {', '.join(missing)}, which the model has; there are "
-            f"recordings of {', '.join(named)}"
-        )
+    named = of_segments(model, recordings)
     return tuple(level for name in model for level in _levels(model, model[name], named[name]))
 
 
