@@ -106,21 +106,14 @@ def kill_at_random(folder: Path, kills: int, seed: int) -> tuple[list[float], li
 NAMES = ("Single", "Chunked", "Keys")
 
 
-@pytest.mark.long
+@pytest.mark.parametrize(
+    ("kills", "seed"),
+    [pytest.param(12, 1, marks=pytest.mark.long), pytest.param(60, 2, marks=pytest.mark.soak)],
+)
 def test_a_killed_recorder_costs_no_sample_and_two_at_once_at_most_a_second(
-    tmp_path: Path, record_property: Callable[[str, object], None]
+    tmp_path: Path, record_property: Callable[[str, object], None], kills: int, seed: int
 ) -> None:
-    costs, files = kill_at_random(tmp_path, 12, seed=1)
+    costs, files = kill_at_random(tmp_path, kills, seed)
     record_property("seconds lost with both recorders", sorted(costs))
-    assert len(files) > 12
-    assert max(costs, default=0.0) <= BOTH_S
-
-
-@pytest.mark.soak
-def test_sixty_kills_of_recorders_cost_no_sample_but_where_both_died(
-    tmp_path: Path, record_property: Callable[[str, object], None]
-) -> None:
-    costs, files = kill_at_random(tmp_path, 60, seed=2)
-    record_property("seconds lost with both recorders", sorted(costs))
-    assert len(files) > 60
+    assert len(files) > kills
     assert max(costs, default=0.0) <= BOTH_S

@@ -257,17 +257,6 @@ def test_blocks_that_tell_the_same_and_blocks_of_other_tasks_are_not_asked_about
     assert not [each for each in found if "not give the same information" in each.text]
 
 
-def test_300_answers_after_the_trials_of_a_step_are_not_asked_about(tmp_path: Path) -> None:
-    changes = (BLOCK, BLOCK.replace("}", ", repeat: 25, ask: [nasa_tlx]}"))
-    assert questions(a_study(tmp_path, changes)) == ()
-
-
-def test_schemes_that_are_alike_fast_by_default_are_not_asked_about(tmp_path: Path) -> None:
-    ((old, new),) = UNLIKE
-    changes = (old, new.replace("speed_m_s: 0.5, ", ""))
-    assert "scheme" not in {each.key for each in questions(a_study(tmp_path, changes))}
-
-
 RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
 REFERENCE = "      - reference: {task: retrieval}"
 ASK = ", ask: [subjective_accuracy, situational_awareness]"
@@ -336,9 +325,16 @@ def test_a_study_that_can_be_scored_is_not_asked_about(
         [("pairs: 1", "pairs: 2"), ("sessions:", "design: {order: {pairs: shuffled}}\nsessions:")],
         [("pairs: 1", "pairs: 2"), ("sessions:", "design: {order: {pairs: {rule: blocked, times: 3}}}\nsessions:")],
         [("sessions:", "design: {order: {pairs: shuffled}}\nsessions:"), (BLOCK, BLOCK.replace("block", "practice") + BLOCK.replace(", pairs: 1", ""))],
+        # 300 answers after the trials of a step, schemes that are alike fast by default, streams that can be no neighbour's.
+        [(BLOCK, BLOCK.replace("}", ", repeat: 25, ask: [nasa_tlx]}"))],
+        [(old, new.replace("speed_m_s: 0.5, ", "")) for old, new in UNLIKE],
+        [("sessions:", "streams: {gaze: {name: Neon, type: Gaze, space: scene}}\nsessions:")],
+        [("sessions:", "streams: {gaze: {source_id: neon-7}}\nsessions:")],
+        [("sessions:", "streams: {gaze: {type: Gaze, several: true, space: screen}}\nsessions:")],
+        [("rate_hz: 240", "rate_hz: 240 #Hz")],
     ],
 )  # fmt: skip
-def test_an_order_that_is_said_and_holds_all_levels_is_not_asked_about(
+def test_what_is_likely_to_be_meant_is_not_asked_about(
     tmp_path: Path, changes: list[tuple[str, str]]
 ) -> None:
     assert questions(a_study(tmp_path, *changes)) == ()
@@ -366,19 +362,6 @@ def test_a_part_is_asked_about_where_plans_of_participants_hold_other_levels(
     asked = [each.key for each in questions(study)]
     assert (asked == ["sessions.1.steps.1.block.pairs"]) == (len(done) > 1), (rule, times, used)
     assert len(asked) == (len(done) > 1)
-
-
-@pytest.mark.parametrize(
-    "need",
-    [
-        "{name: Neon, type: Gaze, space: scene}",
-        "{source_id: neon-7}",
-        "{type: Gaze, several: true, space: screen}",
-    ],
-)
-def test_a_stream_that_can_be_no_neighbours_is_not_asked_about(tmp_path: Path, need: str) -> None:
-    asked = questions(a_study(tmp_path, ("sessions:", f"streams: {{gaze: {need}}}\nsessions:")))
-    assert asked == ()
 
 
 @given(
@@ -746,11 +729,6 @@ def test_a_text_that_ends_at_a_number_sign_is_asked_about_where_that_may_be_text
             assert study.source is not None
             line, column = study.source.position(cut.place)
             assert study.source.text.splitlines()[line - 1][column - 1 :] == text
-
-
-def test_a_number_with_a_comment_is_not_asked_about(tmp_path: Path) -> None:
-    study = a_study(tmp_path, ("rate_hz: 240", "rate_hz: 240 #Hz"))
-    assert "rate_hz" not in {each.key for each in questions(study)}
 
 
 @pytest.mark.parametrize("seed", range(4))

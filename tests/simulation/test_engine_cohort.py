@@ -54,17 +54,11 @@ def compared(folder: Path, names: list[str]) -> None:
     assert moved > 32 * 2.0 * len(names), "each movement is two metres at least"
 
 
-@pytest.mark.long
 @needs("pybullet")
 @needs("mujoco")
-def test_somebody_does_on_mujoco_what_they_do_on_pybullet(tmp_path: Path) -> None:
-    everybody = pseudonyms(r"P\d{3}", 36)
-    drawn = np.random.default_rng().choice(everybody, 2, replace=False)
+@pytest.mark.parametrize(
+    "people", [pytest.param(2, marks=pytest.mark.long), pytest.param(36, marks=pytest.mark.soak)]
+)
+def test_people_do_on_mujoco_what_they_do_on_pybullet(tmp_path: Path, people: int) -> None:
+    drawn = np.random.default_rng().choice(pseudonyms(r"P\d{3}", 36), people, replace=False)
     compared(tmp_path, sorted(drawn.tolist()))
-
-
-@pytest.mark.soak
-@needs("pybullet")
-@needs("mujoco")
-def test_the_whole_cohort_does_on_mujoco_what_it_does_on_pybullet(tmp_path: Path) -> None:
-    compared(tmp_path, list(pseudonyms(r"P\d{3}", 36)))
