@@ -263,21 +263,19 @@ def _examined(raw: RawStream, placed: Placement, treatment: Treatment) -> list[_
 
 
 def _followed(time: FloatArray, sampling: Sampling) -> _Followed:
-    """Return even times and their error; those that polls stamped lie on one straight line.
+    """Return even times and their error; those that polls stamped lie on straight lines.
 
     A phase that slides along the grid of polls is none of the sampler's.
     """
-    if sampling.received is None or not sampling.received.polled:
-        dejittered, doubt = time.copy(), np.full(len(time), sampling.noise_s)
-        for start, stop in itertools.pairwise((0, *sampling.breaks, len(time))):
-            if stop - start >= LONG_RUN:  # the length of a hole is not dejittered
-                part = slice(start, stop)
-                dejittered[part], doubt[part] = follow_sample_clock(
-                    time[part], sampling.index[part]
-                )
-        return dejittered, doubt
-    line = even_line(time, sampling.index)
-    return line, np.full(len(time), sampling.received.strayed_s)
+    received = sampling.received
+    dejittered, doubt = time.copy(), np.full(len(time), sampling.noise_s)
+    for start, stop in itertools.pairwise((0, *sampling.breaks, len(time))):
+        if stop - start >= LONG_RUN:  # the length of a hole is not dejittered
+            run = time[start:stop], sampling.index[start:stop]
+            dejittered[start:stop], doubt[start:stop] = follow_sample_clock(*run)
+            if received is not None and received.polled:
+                dejittered[start:stop], doubt[start:stop] = even_line(*run), received.strayed_s
+    return dejittered, doubt
 
 
 def _evened(
@@ -303,8 +301,9 @@ def _evened(
             error[part] += doubt
             if sampling.unplaced or sampling.uncounted:
                 error[part] += sampling.noise_s / 2.0
-            if sampling.received is not None or (sampling.late_stamps and not declared):
-                error[part] += sampling.noise_s
+            # A mean that is declared is that of the session, and none of a while.
+            known = (declared and sampling.received is None) or not sampling.late_stamps
+            error[part] += max(sampling.shift_s, 0.0 if known else sampling.noise_s)
         elif way in {Dejitter.LEAST_SQUARES, Dejitter.ENVELOPE}:
             index = sampling.index if raw.index is None else raw.index[part]
             time[part] = even(placed.time[part], index, way)

@@ -107,7 +107,10 @@ class Sampling:
         By how much samples near a loss may be off, shape ``(n,)``: which of them came before it is
         not known.
     kept_s
-        Scatter of timestamps, as arrivals show, that could not be dejittered.
+        Scatter of late timestamps, or of those that arrivals show, that could not be dejittered;
+        the period, where polls of samples may have been as fast as these.
+    shift_s
+        By how much all samples may be shifted with no stamp on its grid of polls changed.
     back_s
         By how much the clock of an irregular stream without arrivals may have been set back.
     behind
@@ -138,6 +141,7 @@ class Sampling:
     unsure_s: FloatArray | float = 0.0
     back_s: float = 0.0
     kept_s: float = 0.0
+    shift_s: float = 0.0
     behind: int = 0
 
     @property
@@ -149,8 +153,8 @@ class Sampling:
         """Return it as steady only if evening moved samples as far as stamping noise scatters.
 
         Noise is new in each stamp, so that a few neighbours show all of it. What adds up beyond
-        that is the sampler's own, as of a camera that takes longer in the dark. What arrivals show
-        to be noise stays noise, as far as neighbours show it, though nothing takes it away.
+        that is the sampler's own, as of a camera that takes longer in the dark. What is shown to be
+        noise stays noise, as far as neighbours show it, though nothing takes it away.
 
         Parameters
         ----------
@@ -163,7 +167,7 @@ class Sampling:
         allowed = WITHIN * self.grid_s if by_grid else self.reach_s
         if float(np.quantile(np.abs(moved), 0.95)) <= allowed:
             return self
-        kept = 0.0 if self.late_stamps else min(self.noise_s, self.reach_s)
+        kept = min(self.noise_s, self.reach_s)
         return replace(
             self, noise_s=0.0, kept_s=kept, late_stamps=False, steady=False, unplaced=False
         )
@@ -223,7 +227,8 @@ def examine(
         sure = slice(None)
         if level is not None:
             index, sure = index + level.lost, level.unsure == 0.0
-        waited = receipt.find(time[sure], index[sure], explained=explained)
+        flowed = time if counter is None else found.flowed
+        waited = receipt.find(flowed[sure], index[sure], explained=explained)
         if waited is not None:
             longer = np.diff(index) > 1.5  # noqa: PLR2004
             return Sampling(
@@ -240,6 +245,8 @@ def examine(
                 index=index,
                 unsure_s=0.0 if level is None else level.unsure * waited.period,
                 uncounted=blurred and level is None,
+                shift_s=receipt.open_shift(flowed, index),
+                breaks=found.breaks[: 0 if counter is None else None],
             )
     noise, late, by_grid, uneven = _noise(time, arrival, found, grid)
     rates = _rates(found)
@@ -266,6 +273,8 @@ def examine(
         uneven_s=uneven,
         strayed=None if disordered or rates else found.strayed,
         breaks=found.breaks,
+        kept_s=found.period if found.slips else 0.0,
+        shift_s=receipt.open_shift(found.flowed, found.index) if late else 0.0,
     )
 
 
@@ -334,6 +343,7 @@ class _Steps:
     balance: float
     shifted: shifts.Shifts
     strayed: FloatArray | None
+    slips: bool
 
 
 def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -> _Steps:
@@ -353,13 +363,15 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
     one_rate = bool(np.ptp(np.quantile(local, (0.1, 0.9))) < RATE_CHANGE * typical)
     computed = clumped or (not grid and in_chunks and one_rate)
     exact = exact and not computed
+    uncounted = steps - (counts - 1.0) * local
+    hole = holes.find(uncounted, local, scatter, grid, exact=exact, chunks=computed)
     if counted:
-        # A device that pauses and keeps its count has lost nothing, but was interrupted.
-        pause = exact & (steps - counts * local > np.maximum(shifts.LEAST_S, WHOLE * local))
-        beyond = pause * (steps - counts * local)
-        breaks, longer = np.flatnonzero(pause), np.ones(len(steps), dtype=np.bool_)
+        # A device that pauses and keeps its count has lost nothing, but was interrupted; a poll
+        # that finds no sample yet makes the next one late by up to a period.
+        beyond = hole.size(len(steps))
+        breaks = np.flatnonzero(beyond)
+        longer = np.ones(len(steps), dtype=np.bool_)
     else:
-        hole = holes.find(steps, local, scatter, grid, exact=exact, chunks=computed)
         whole, beyond = 1.0 + hole.lost(len(steps)), hole.beyond(len(steps))
         breaks = hole.at[hole.broken | hole.untold]
         longer = np.isin(np.arange(len(steps)), hole.at[hole.broken])
@@ -392,6 +404,7 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
     return _Steps(
         time, flowed, breaks + 1, mean, local, position, missing, int(gaps.sum()), longest, exact,
         computed, clumped, balance, shifted, strayed,
+        exact and not counted and hole.may_be_slips(len(steps)),
     )  # fmt: skip
 
 

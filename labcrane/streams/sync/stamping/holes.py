@@ -46,6 +46,11 @@ TOLD = 0.25
 
 MANY = 200
 
+SLIDE, EVEN = 5e-4, 1.25
+"""No sampler is faster or slower than polls at its own rate by more, or their phase does not slide
+evenly: no run between two polls that find nothing is so many times as long as another.
+"""
+
 
 @dataclass(frozen=True, slots=True)
 class Holes:
@@ -70,6 +75,22 @@ class Holes:
     broken: npt.NDArray[np.bool_]
     untold: npt.NDArray[np.bool_]
     usual: FloatArray
+
+    def may_be_slips(self, count: int) -> bool:
+        """Return whether nothing was lost in ``count`` steps, maybe, but polls found no sample yet.
+
+        Those that are as fast as the sampler find none at even intervals, as its phase slides.
+        """
+        one = self.at[~self.broken & ~self.untold & (np.round(self.periods) == 1.0)]
+        runs = np.diff(np.r_[0, one, count])
+        whole = runs[1:-1].min(initial=count)
+        return bool(0 < len(one) < SLIDE * count and runs.max() <= EVEN * whole)
+
+    def size(self, count: int) -> FloatArray:
+        """Return by how many seconds each of ``count`` steps is longer than any poll explains."""
+        found = np.zeros(count)
+        found[self.at] = np.where(self.periods > 1.5, self.periods * self.usual, 0.0)  # noqa: PLR2004
+        return found
 
     def lost(self, count: int) -> FloatArray:
         """Return how many samples were lost in each step, shape ``(count,)``."""

@@ -38,6 +38,9 @@ SHORTEST_POLL_S = 2e-3
 SOME = 0.01
 EQUAL_S = 3e-6
 SAME = 0.5
+PHASES = 400
+"""So many polls show the phases of a while."""
+
 SLICE = 200_000
 """So many samples show how neighbours are alike."""
 
@@ -64,6 +67,37 @@ class Receipt:
     strayed_s: float
 
 
+def open_shift(time: FloatArray, index: FloatArray) -> float:
+    """Return by how much all samples may be shifted with no stamp on a grid of polls changed.
+
+    Polls at phases of the sampler that differ leave no room. Where the interval is a simple ratio
+    of what they wait for, the same few phases come again and again, and slide between two of them
+    for minutes, as if the sampler were slower or faster. 0 where stamps are on no such grid.
+
+    Parameters
+    ----------
+    time, index
+        As of :func:`find`.
+    """
+    steps = np.diff(time)
+    apart = np.abs(steps - np.median(steps)) > EQUAL_S if _is_computed(steps) else steps > EQUAL_S
+    last = np.r_[np.flatnonzero(apart), len(time) - 1]
+    interval = _poll_interval(np.diff(time[last])) if len(last) > LEAST else 0.0
+    if not interval:
+        return 0.0
+    taken = time[np.repeat(last, np.diff(last, prepend=-1))]
+    # Samples that always come together are waited for together.
+    together = max(int(np.gcd.reduce(np.diff(index[last[:-1]]).astype(int))), 1)
+    whole = (index - index[last[0]]) % together == 0.0
+    shift = 0.0
+    for part in np.array_split(np.flatnonzero(whole), whole.sum() // PHASES + 1):
+        due, late = index[part] - index[part[0]], taken[part] - taken[part[0]]
+        period, level = np.polyfit(due, late, 1)
+        phases = np.sort((late - level - period * due) % interval)
+        shift = max(shift, float(np.diff(phases, append=phases[0] + interval).max()))
+    return shift
+
+
 def find(time: FloatArray, index: FloatArray, *, explained: bool = False) -> Receipt | None:
     """Return how samples were received; None where nothing shows that they waited.
 
@@ -80,7 +114,7 @@ def find(time: FloatArray, index: FloatArray, *, explained: bool = False) -> Rec
     steps = np.diff(time)
     if len(time) < ENOUGH or (np.diff(index) <= 0.0).any():
         return None
-    computed, polled = _is_computed(steps), _is_polled(steps)
+    computed, polled = _is_computed(steps), _poll_interval(steps) > 0.0
     # Chunks computed back by a slower rate than theirs reach behind the one before.
     if (explained and not polled) or ((steps < -EQUAL_S).any() and not computed):
         return None
@@ -104,22 +138,22 @@ def find(time: FloatArray, index: FloatArray, *, explained: bool = False) -> Rec
     return None
 
 
-def _is_polled(steps: FloatArray) -> bool:
-    """Whether steps are several multiples of one interval, which is not that of the samples."""
+def _poll_interval(steps: FloatArray) -> float:
+    """Return the interval of which steps are several multiples, not that of samples; else 0."""
     long = steps[steps > SHORTEST_POLL_S / 2.0]
     if len(long) < len(steps) / 50:
-        return False
+        return 0.0
     shortest = float(np.quantile(long, 0.02))
     near = long[np.abs(long - shortest) < 0.1 * shortest]
     for parts in (1, 2, 3, 4):
         interval = float(np.median(near)) / parts
         if interval < SHORTEST_POLL_S:
-            return False
+            return 0.0
         multiples = np.round(steps / interval)
         if (np.abs(steps / interval - multiples) < ON_GRID).mean() > NEARLY_ALL:
             shares = np.unique(multiples, return_counts=True)[1] / len(steps)
-            return int(np.count_nonzero(shares > SOME)) > 1
-    return False
+            return interval if np.count_nonzero(shares > SOME) > 1 else 0.0
+    return 0.0
 
 
 def _is_computed(steps: FloatArray) -> bool:
