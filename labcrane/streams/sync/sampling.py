@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.streams.sync.stamping import holes, levels, receipt, shifts, strays, units
-from labcrane.streams.sync.stamping.late_chunks import lost_before, lost_between, slope, soonest
+from labcrane.streams.sync.stamping.late_chunks import lost_before, lost_between, slope
 from labcrane.types import FloatArray
 
 FEW = 20
@@ -35,7 +35,6 @@ SAME = 0.5
 EARLIER = 0.1
 """At least this part of chunks stamped when sent waited for less than the one before."""
 
-DELAYS = 0.25
 RATE_CHANGE = 1e-3
 PIECES = 8
 """So many pieces at least tell a changing rate."""
@@ -340,7 +339,6 @@ class _Steps:
     exact: bool
     computed: bool
     clumped: bool
-    balance: float
     shifted: shifts.Shifts
     strayed: FloatArray | None
     slips: bool
@@ -358,7 +356,7 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
     scatter = 1.4826 * float(np.median(np.abs(rest)))
     odd = float((np.abs(rest) > WHOLE * local).mean())
     exact = scatter < EXACT * float(np.median(local)) and odd < 0.01  # noqa: PLR2004
-    same, balance, in_chunks = _chunks(steps, counts * local)
+    same, in_chunks = _chunks(steps, counts * local)
     # Steps are computed by one rate, whatever the clock that stamps the chunks does meanwhile.
     one_rate = bool(np.ptp(np.quantile(local, (0.1, 0.9))) < RATE_CHANGE * typical)
     computed = clumped or (not grid and in_chunks and one_rate)
@@ -403,27 +401,22 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
         mean = slope(position[strayed == 0.0], flowed[strayed == 0.0])
     return _Steps(
         time, flowed, breaks + 1, mean, local, position, missing, int(gaps.sum()), longest, exact,
-        computed, clumped, balance, shifted, strayed,
+        computed, clumped, shifted, strayed,
         exact and not counted and hole.may_be_slips(len(steps)),
     )  # fmt: skip
 
 
-def _chunks(steps: FloatArray, usual: FloatArray) -> tuple[npt.NDArray[np.bool_], float, bool]:
-    """Return which steps are usual ones, how far others add up, and whether these part chunks.
-
-    Steps of chunks stamped when sent differ by their delays, which do not add up.
-    """
+def _chunks(steps: FloatArray, usual: FloatArray) -> tuple[npt.NDArray[np.bool_], bool]:
+    """Return which steps are usual ones, and whether others part chunks."""
     same = np.abs(steps - usual) < EQUAL_S
     boundary = (steps - usual)[~same]
-    moved = float(np.abs(boundary).sum())
-    balance = abs(float(boundary.sum())) / moved if moved > 0.0 else 0.0
     between = boundary / usual[~same]
     fraction = np.abs(between - np.round(between)) > 0.05 if len(between) else np.zeros(0, bool)  # noqa: PLR2004
     repeated = same.mean() > SAME and len(boundary) >= FEW and fraction.mean() > 0.5  # noqa: PLR2004
     # A chunk that waits for longer than the one before comes late, the next one early.
     early = boundary < -EQUAL_S
     both_ways = len(early) > 0 and float(early.mean()) > EARLIER
-    return same, balance, bool(repeated and both_ways)
+    return same, bool(repeated and both_ways)
 
 
 def _typical(time: FloatArray, index: FloatArray) -> float:
@@ -470,11 +463,8 @@ def _rates(found: _Steps) -> tuple[float, ...]:
     if found.strayed is not None:
         own = np.flatnonzero(found.strayed == 0.0)
         edges = np.unique(own[np.minimum(np.searchsorted(own, edges), len(own) - 1)])
-    blurred = 0.0
-    if found.computed:
-        edges, blurred = soonest(found.flowed, found.period, found.index)
     span = np.diff(found.index[edges])
-    if len(span) < PIECES or (span <= 0).any() or (found.computed and found.balance >= DELAYS):
+    if found.computed or len(span) < PIECES or (span <= 0).any():
         return ()
     if not (np.diff(found.flowed[edges]) > 0.0).all():  # stamps stood still, or went back
         return ()
@@ -483,8 +473,7 @@ def _rates(found: _Steps) -> tuple[float, ...]:
     ends = [float(np.median(part)) for part in (rate[:4], rate[-4:])]
     mean = float(np.median(rate))
     low, high = np.quantile(rate, (0.05, 0.95))
-    blurred *= mean / float(np.diff(found.flowed[edges]).min())
-    if high - low < max(RATE_CHANGE * mean, 8.0 * scatter, blurred):
+    if high - low < max(RATE_CHANGE * mean, 8.0 * scatter):
         return ()
     if found.exact or abs(ends[1] - ends[0]) > RATE_CHANGE * mean:
         return 1.0 / ends[0], 1.0 / ends[1]

@@ -5,7 +5,6 @@ not come back.
 """
 
 import numpy as np
-import numpy.typing as npt
 
 from labcrane.types import FloatArray
 
@@ -16,7 +15,6 @@ PARTS, SOONEST = 5, 4
 """The soonest chunks of the first part and of the last tell what was lost between."""
 
 LAST = 10
-BLOCKS = 13
 
 
 def lost_between(index: FloatArray, rest: FloatArray, period: float) -> tuple[bool, float]:
@@ -62,26 +60,6 @@ def lost_before(rest: FloatArray, period: float) -> FloatArray:
     soonest = np.minimum.accumulate(rest[::-1])[::-1]
     known = np.minimum(soonest, soonest[-min(LAST, len(soonest))])
     return np.asarray(np.round((known - known[0]) / period))
-
-
-def soonest(
-    time: FloatArray, period: float, index: FloatArray
-) -> tuple[npt.NDArray[np.intp], float]:
-    """Return the least delayed sample of each of some blocks, and how blurred their times are.
-
-    Parameters
-    ----------
-    time, index
-        Of each sample, and which it is, shape ``(n,)``.
-    period
-        Of the samples, in seconds.
-    """
-    rest = time - period * index
-    blocks = np.array_split(np.arange(len(rest)), BLOCKS)
-    least = np.array([block[np.argmin(rest[block])] for block in blocks])
-    spread = [float(np.quantile(rest[block], 0.25) - rest[block].min()) for block in blocks]
-    # Where bursts are stamped at once, a block may begin anywhere within one.
-    return least, 4.0 * max(*spread, float(np.quantile(np.diff(time), 0.99)))
 
 
 def slope(x: FloatArray, y: FloatArray) -> float:
