@@ -291,7 +291,7 @@ def _evened(
         error[part] += sampling.grid_s / 2.0 + sampling.back_s + sampling.kept_s
         error[part] += sampling.unsure_s
         if not treatment.can_drop_samples:  # nothing else tells uneven samples from late stamps
-            error[part] += NEARLY_ALL * sampling.uneven_s
+            error[part] += NEARLY_ALL * sampling.uneven_s + sampling.slip_s
         if sampling.strayed is not None:
             error[part] += sampling.strayed
         if sampling.shifted is not None:

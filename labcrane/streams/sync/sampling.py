@@ -106,8 +106,9 @@ class Sampling:
         By how much samples near a loss may be off, shape ``(n,)``: which of them came before it is
         not known.
     kept_s
-        Scatter of late timestamps, or of those that arrivals show, that could not be dejittered;
-        the period, where polls of samples may have been as fast as these.
+        Scatter of late timestamps, or of those that arrivals show, that could not be dejittered.
+    slip_s
+        The period, where holes may be polls that were as fast as the sampler.
     shift_s
         By how much all samples may be shifted with no stamp on its grid of polls changed.
     back_s
@@ -140,6 +141,7 @@ class Sampling:
     unsure_s: FloatArray | float = 0.0
     back_s: float = 0.0
     kept_s: float = 0.0
+    slip_s: float = 0.0
     shift_s: float = 0.0
     behind: int = 0
 
@@ -217,8 +219,8 @@ def examine(
     grid = 0.0 if _on_grid(found, stamps[order], grid) else grid
     shifted = found.exact and len(found.shifted.at) > 0
     level, blurred = None, False
-    if probed and not disordered and not grid and not shifted:
-        explained = found.computed and not found.missing and not found.clumped
+    explained = found.computed and not found.missing and not found.clumped
+    if probed and not disordered and not grid and not shifted and not explained:
         blurred = counter is None and (found.clumped or not (found.exact or found.computed))
         if blurred:
             find = levels.of_packets if found.clumped else levels.find
@@ -227,7 +229,7 @@ def examine(
         if level is not None:
             index, sure = index + level.lost, level.unsure == 0.0
         flowed = time if counter is None else found.flowed
-        waited = receipt.find(flowed[sure], index[sure], explained=explained)
+        waited = receipt.find(flowed[sure], index[sure])
         if waited is not None:
             longer = np.diff(index) > 1.5  # noqa: PLR2004
             return Sampling(
@@ -272,7 +274,7 @@ def examine(
         uneven_s=uneven,
         strayed=None if disordered or rates else found.strayed,
         breaks=found.breaks,
-        kept_s=found.period if found.slips else 0.0,
+        slip_s=found.period if found.slips else 0.0,
         shift_s=receipt.open_shift(found.flowed, found.index) if late else 0.0,
     )
 
@@ -364,15 +366,10 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
     uncounted = steps - (counts - 1.0) * local
     hole = holes.find(uncounted, local, scatter, grid, exact=exact, chunks=computed)
     if counted:
-        # A device that pauses and keeps its count has lost nothing, but was interrupted; a poll
-        # that finds no sample yet makes the next one late by up to a period.
-        beyond = hole.size(len(steps))
-        breaks = np.flatnonzero(beyond)
-        longer = np.ones(len(steps), dtype=np.bool_)
-    else:
-        whole, beyond = 1.0 + hole.lost(len(steps)), hole.beyond(len(steps))
-        breaks = hole.at[hole.broken | hole.untold]
-        longer = np.isin(np.arange(len(steps)), hole.at[hole.broken])
+        hole = hole.pauses()
+    whole, beyond = counts + hole.lost(len(steps)), hole.beyond(len(steps))
+    breaks = hole.at[hole.broken | hole.untold]
+    longer = np.isin(np.arange(len(steps)), hole.at[hole.broken]) | counted
     back = np.zeros(len(steps))
     if not computed:
         back = holes.went_back(steps - counts * local, local, typical, scatter)
@@ -460,9 +457,6 @@ def _is_shuffled(steps: FloatArray, in_order: FloatArray) -> bool:
 def _rates(found: _Steps) -> tuple[float, ...]:
     """Return the rates at first and at last where they differ by more than stamps scatter."""
     edges = np.linspace(0, len(found.time) - 1, 41).astype(int)
-    if found.strayed is not None:
-        own = np.flatnonzero(found.strayed == 0.0)
-        edges = np.unique(own[np.minimum(np.searchsorted(own, edges), len(own) - 1)])
     span = np.diff(found.index[edges])
     if found.computed or len(span) < PIECES or (span <= 0).any():
         return ()

@@ -47,8 +47,7 @@ TOLD = 0.25
 MANY = 200
 
 SLIDE, EVEN = 5e-4, 1.25
-"""No sampler is faster or slower than polls at its own rate by more, or their phase does not slide
-evenly: no run between two polls that find nothing is so many times as long as another.
+"""Polls at a sampler's own rate differ from it by no more, and miss it at intervals that are alike.
 """
 
 
@@ -86,11 +85,10 @@ class Holes:
         whole = runs[1:-1].min(initial=count)
         return bool(0 < len(one) < SLIDE * count and runs.max() <= EVEN * whole)
 
-    def size(self, count: int) -> FloatArray:
-        """Return by how many seconds each of ``count`` steps is longer than any poll explains."""
-        found = np.zeros(count)
-        found[self.at] = np.where(self.periods > 1.5, self.periods * self.usual, 0.0)  # noqa: PLR2004
-        return found
+    def pauses(self) -> "Holes":
+        """Return those of a counter that are longer than by a poll that found no sample yet."""
+        at, usual, periods = (x[self.periods > 1.5] for x in (self.at, self.usual, self.periods))  # noqa: PLR2004
+        return Holes(at, periods, at >= 0, at < 0, usual)
 
     def lost(self, count: int) -> FloatArray:
         """Return how many samples were lost in each step, shape ``(count,)``."""

@@ -98,7 +98,7 @@ def open_shift(time: FloatArray, index: FloatArray) -> float:
     return shift
 
 
-def find(time: FloatArray, index: FloatArray, *, explained: bool = False) -> Receipt | None:
+def find(time: FloatArray, index: FloatArray) -> Receipt | None:
     """Return how samples were received; None where nothing shows that they waited.
 
     Parameters
@@ -107,16 +107,13 @@ def find(time: FloatArray, index: FloatArray, *, explained: bool = False) -> Rec
         Stamps in seconds, shape ``(n,)``, in the order of arrival.
     index
         The sampler's count, shape ``(n,)``.
-    explained
-        Whether the stamps are known to be those of chunks stamped when sent: then only the grid of
-        polls says more.
     """
     steps = np.diff(time)
     if len(time) < ENOUGH or (np.diff(index) <= 0.0).any():
         return None
     computed, polled = _is_computed(steps), _poll_interval(steps) > 0.0
     # Chunks computed back by a slower rate than theirs reach behind the one before.
-    if (explained and not polled) or ((steps < -EQUAL_S).any() and not computed):
+    if (steps < -EQUAL_S).any() and not computed:
         return None
     period, level = np.polyfit(index - index[0], time - time[0], 1)
     rest = time - time[0] - level - period * (index - index[0])
