@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from labcrane.analysis.report.factors import CONDITION
 from labcrane.analysis.report.panels import FAINT, GREY, Panel, Series, figure_of, lighter
 from labcrane.analysis.report.sample import counted
-from labcrane.analysis.report.style import COLOURS, HIGH, new_figure, styled
+from labcrane.analysis.report.style import COLOURS, HIGH, PAGE, new_figure, styled
 from labcrane.analysis.statistics.fitts import Regression, mean_line, regress
 from labcrane.analysis.statistics.learning import CURVES
 from labcrane.analysis.statistics.trends import LEAST
+from labcrane.analysis.tables.load import FEWEST
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -58,6 +60,10 @@ class Drawing:
     def figure(self) -> "Figure":
         """The figure as Matplotlib draws it."""
         return figure_of(self.panels)
+
+
+ROW, HEAD = 0.8, 0.7
+"""Height of a row of the figure of load, and of all else in it, in inches."""
 
 
 class Lines(Drawing):
@@ -361,3 +367,48 @@ def thresholds(table: "pd.DataFrame") -> "Figure":
         axes.plot(ends, ends, color="0.3", linewidth=1)
         axes.set(xlabel="threshold", ylabel="estimate", title=f"{name}, simulated operators")
     return figure
+
+
+class LoadFigure(Drawing):
+    """A row for each person, a column for each measure, conditions from left to right."""
+
+    @property
+    def figure(self) -> "Figure":
+        """The figure as Matplotlib draws it."""
+        from matplotlib.figure import Figure
+
+        people = list(dict.fromkeys(self.table["participant"].sort_values()))
+        measures = list(dict.fromkeys(self.table["measure"]))
+        levels = sorted(set(self.table[CONDITION]))
+        with styled():
+            high = ROW * len(people) + HEAD
+            figure = Figure((PAGE, high), layout="constrained")
+            grid = figure.subplots(
+                len(people), len(measures), sharex=True, sharey="col", squeeze=False
+            )
+            for person, row in zip(people, grid, strict=True):
+                for measure, axes in zip(measures, row, strict=True):
+                    mine = self.table["participant"] == person
+                    own = self.table[mine & (self.table["measure"] == measure)]
+                    x = np.array([levels.index(each) for each in own[CONDITION]])
+                    ends = own["mean"] - own["ci_low"], own["ci_high"] - own["mean"]
+                    reach = np.nan_to_num(np.maximum(ends, 0.0))
+                    axes.errorbar(x, own["mean"], reach, fmt="o", color=COLOURS[0], elinewidth=0.8)
+                    axes.set_xlim(-0.5, len(levels) - 0.5)
+                    axes.spines[["top", "right"]].set_visible(False)
+                row[0].set_ylabel(person, rotation=0, ha="right", fontsize=6.0)
+            for measure, axes in zip(measures, grid[0], strict=True):
+                axes.set_title(measure.replace("_", "\n", 1), fontsize=6.5)
+            for axes in grid[-1]:
+                axes.set_xticks(range(len(levels)), levels, rotation=45, ha="right", fontsize=6.0)
+        return figure
+
+
+def load(table: "pd.DataFrame") -> Drawing:
+    """Return the figure of :func:`~labcrane.analysis.tables.load.load_table`."""
+    caption = (
+        "Measures of load by condition, one row per person. Points: means of a person's movements, "
+        f"bars: 95 % confidence intervals (t) over {FEWEST} or more movements; hit rates are of "
+        "all stimuli, with Wilson's interval. A questionnaire that was asked once has none."
+    )
+    return LoadFigure("load", caption, (), table)

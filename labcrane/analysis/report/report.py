@@ -54,6 +54,7 @@ from labcrane.analysis.statistics.mixed import TIMES, MixedModel, NoModelError, 
 from labcrane.analysis.statistics.time_outs import time_outs
 from labcrane.analysis.statistics.time_scales import QUANTITIES, TAKEN
 from labcrane.analysis.tables.annotations import annotations_of
+from labcrane.analysis.tables.load import correlations, load_table
 from labcrane.analysis.unusable import Unusable
 from labcrane.files.yaml import parse_yaml
 from labcrane.recording.participant_file.writer import kept_open
@@ -328,6 +329,7 @@ def _study(
     for measure in study.measures:
         _mixed(page, results.assign(sequence=results[PLACE]), measure)
     _gaze(page, results, found)
+    _load(page, results, scores)
     if len(scores):
         page.heading("Questionnaires")
         page.table("scores", outcomes.score_table(scores, groups))
@@ -460,6 +462,21 @@ def _of_primary(primary: Sequence[str], measures: Sequence[str]) -> str:
     said = f"Primary outcomes, as the protocol names them: {', '.join(primary)}."
     missing = [name for name in primary if name not in measures]
     return f"{said} Without a value in any movement: {', '.join(missing)}." if missing else said
+
+
+def _load(page: Page, results: "pd.DataFrame", scores: "pd.DataFrame") -> None:
+    """Add what a second task, the questionnaire and the sticks show of each person's load."""
+    table = load_table(results, scores)
+    if not len(table):
+        return
+    page.heading("Load")
+    page.draw(figures.load(table))
+    page.rows(
+        "load_correlations",
+        correlations(table),
+        "Correlations within persons, over conditions. They show whether measures change together, "
+        "not that one of them measures load. Intervals are wide for few conditions.",
+    )
 
 
 def _gaze(page: Page, results: "pd.DataFrame", found: Results) -> None:
