@@ -28,8 +28,9 @@ from pathlib import Path
 from benchmarks.table import Row, missed
 
 SUBJECTS = (
-    "tick", "scenario", "oversight", "beside", "real_time", "recording", "length", "sync",
-    "signals", "view", "viewer", "sound", "analysis", "report", "cohort", "start_up", "pages",
+    "tick", "secondary", "scenario", "oversight", "beside", "real_time", "recording", "length",
+    "sync", "signals", "view", "viewer", "sound", "analysis", "report", "cohort", "start_up",
+    "pages",
 )  # fmt: skip
 NEEDS = {
     "beside": ("jackd", "jack_wait"), "real_time": ("jackd", "jack_wait"), "sync": ("gcc",),
