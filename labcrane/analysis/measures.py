@@ -29,6 +29,7 @@ from labcrane.analysis.sticks import (
     inceptor_use,
     limit_hits,
     prediction_errors,
+    resolution,
     reversals,
     steering_entropy,
     stick_use,
@@ -315,6 +316,8 @@ OF_STICKS = (
     "aggressiveness",
     "stick_power",
     "stick_centroid",
+    "stick_step",
+    "stick_least",
 )
 """Measures of sticks, whatever their number."""
 
@@ -347,6 +350,7 @@ def _sticks(movement: Movement, span: slice, settings: MeasureSettings) -> dict[
         least_rate=settings.moving_rate,
         highest_hz=settings.stick_highest_hz,
     )
+    step, least = resolution(axes)
     turns = sum(reversals(values, settings.hysteresis) for values in axes.values())
     found = {
         "reversals": turns / seconds,
@@ -357,6 +361,8 @@ def _sticks(movement: Movement, span: slice, settings: MeasureSettings) -> dict[
         "aggressiveness": worked.aggressiveness,
         "stick_power": worked.power,
         "stick_centroid": worked.centroid,
+        "stick_step": step,
+        "stick_least": least,
     }
     hands = [_deflection(axes, stick) for stick in sorted({n.rpartition(".")[0] for n in axes})]
     if len(hands) == 2:  # noqa: PLR2004 - a pair of hands

@@ -235,6 +235,20 @@ def _spectrum(values: FloatArray, rate_hz: float, highest_hz: float) -> tuple[fl
     return total, float(frequency[own] @ power[own]) / total if total > 0.0 else float("nan")
 
 
+def resolution(axes: Mapping[str, FloatArray]) -> tuple[float, float]:
+    """Return the smallest step and the smallest deflection of the axes; NaN where nothing moves.
+
+    A step as large as a limit of the measures, or a dead zone that hides small deflections, decides
+    them instead of the hands.
+    """
+    values = np.array(list(axes.values()))
+    found = []
+    for sizes in (np.abs(np.diff(values, axis=1)), np.abs(values)):
+        moved = sizes[sizes > 0.0]
+        found.append(float(moved.min()) if moved.size else float("nan"))
+    return found[0], found[1]
+
+
 STEP_S = 0.15
 """Time between the samples of steering entropy."""
 

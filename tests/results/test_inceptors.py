@@ -3,12 +3,15 @@
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from labcrane.analysis.report.report import _coarse_sticks
 from labcrane.analysis.sticks import (
     InceptorUse,
     inceptor_use,
     prediction_errors,
+    resolution,
     steering_entropy,
     stick_rates,
 )
@@ -110,3 +113,23 @@ def test_the_entropy_of_normal_errors_is_that_of_its_bins() -> None:
     shares = shares[shares > 0]
     expected = -(shares * np.log(shares)).sum() / math.log(9)
     assert steering_entropy(errors, usual) == pytest.approx(expected, abs=0.003)
+
+
+@RATES
+def test_steps_and_a_dead_zone_are_found_in_an_axis(rate_hz: float) -> None:
+    axis = 0.6 * np.sin(2 * np.pi * 0.4 * times(rate_hz))
+    coarse = np.round(axis / 0.05) * 0.05
+    dead = np.where(np.abs(axis) < 0.1, 0.0, axis)
+    assert resolution({"x": coarse})[0] == pytest.approx(0.05)
+    assert 0.1 <= resolution({"x": dead})[1] < 0.1 + 0.6 * 2 * np.pi * 0.4 / rate_hz
+    assert np.isnan(resolution({"x": np.zeros(10)})).all()
+
+
+def test_the_report_warns_where_sampling_or_a_dead_zone_decides() -> None:
+    fine = {"stick_step": 1e-4, "stick_least": 1e-4, "stick_centroid": 0.5}
+    assert _coarse_sticks(pd.DataFrame([fine])) == ""
+    odd = [{"stick_step": 0.05}, {"stick_least": 0.1}, {"stick_centroid": np.nan}]
+    said = _coarse_sticks(pd.DataFrame([fine, *({**fine, **each} for each in odd)]))
+    assert "In 1 of 4 movements a stick axis changes in steps larger than 0.01" in said
+    assert "In 1 of 4 movements no deflection is smaller than 0.02" in said
+    assert "In 1 of 4 movements the loop is too slow for 10 Hz" in said

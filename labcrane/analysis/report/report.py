@@ -395,6 +395,8 @@ def _movements(
     if results["simultaneous"].notna().any():
         page.heading("Use of the sticks")
         page.draw(figures.sticks(results))
+        if said := _coarse_sticks(results):
+            page.say(said)
 
 
 def _rests(results: "pd.DataFrame") -> str:
@@ -462,6 +464,34 @@ def _of_primary(primary: Sequence[str], measures: Sequence[str]) -> str:
     said = f"Primary outcomes, as the protocol names them: {', '.join(primary)}."
     missing = [name for name in primary if name not in measures]
     return f"{said} Without a value in any movement: {', '.join(missing)}." if missing else said
+
+
+def _coarse_sticks(results: "pd.DataFrame", settings: MeasureSettings = DEFAULTS) -> str:
+    """Return what decides the measures of the sticks instead of the hands; empty for nothing."""
+    if "stick_step" not in results:
+        return ""
+    least_change = settings.moving_rate * settings.rate_window_s
+    used, found = results["stick_step"].notna(), []
+    for count, why in (
+        (
+            (results["stick_step"] > least_change).sum(),
+            f"a stick axis changes in steps larger than {least_change:g}, which decide duty_cycle "
+            "and aggressiveness",
+        ),
+        (
+            (results["stick_least"] > settings.hysteresis).sum(),
+            f"no deflection is smaller than {settings.hysteresis:g}, as with a dead zone, which "
+            "decides reversals and the use of the axes",
+        ),
+        (
+            (used & results["stick_centroid"].isna()).sum(),
+            f"the loop is too slow for {settings.stick_highest_hz:g} Hz, so that stick_power and "
+            "stick_centroid are missing",
+        ),
+    ):
+        if count:
+            found.append(f"In {count} of {len(results)} movements {why}.")
+    return " ".join(found)
 
 
 def _load(page: Page, results: "pd.DataFrame", scores: "pd.DataFrame") -> None:

@@ -50,6 +50,8 @@ MEASURES: Mapping[str, tuple[str, str]] = {
     ),
     "stick_power": ("1", "variance of all stick axes together, up to 10 Hz"),
     "stick_centroid": ("Hz", "mean frequency of that power"),
+    "stick_step": ("1", "smallest change of a stick axis from one tick to the next"),
+    "stick_least": ("1", "smallest deflection of a stick axis; a dead zone hides smaller ones"),
     "steering_entropy": (
         "1",
         "entropy of the errors of a prediction of the stick axes, 0 to 1; compared with all "
