@@ -36,9 +36,6 @@ EARLIER = 0.1
 """At least this part of chunks stamped when sent waited for less than the one before."""
 
 RATE_CHANGE = 1e-3
-PIECES = 8
-"""So many pieces at least tell a changing rate."""
-
 LEAST_NOISE_S = 5e-5
 WITHIN = 0.75
 """Stamps on a grid scatter by half of its unit; what scatters by more was not taken evenly."""
@@ -407,13 +404,13 @@ def _chunks(steps: FloatArray, usual: FloatArray) -> tuple[npt.NDArray[np.bool_]
     """Return which steps are usual ones, and whether others part chunks."""
     same = np.abs(steps - usual) < EQUAL_S
     boundary = (steps - usual)[~same]
+    if same.mean() <= SAME or len(boundary) < FEW:
+        return same, False
     between = boundary / usual[~same]
-    fraction = np.abs(between - np.round(between)) > 0.05 if len(between) else np.zeros(0, bool)  # noqa: PLR2004
-    repeated = same.mean() > SAME and len(boundary) >= FEW and fraction.mean() > 0.5  # noqa: PLR2004
+    fraction = np.abs(between - np.round(between)) > 0.05  # noqa: PLR2004
     # A chunk that waits for longer than the one before comes late, the next one early.
-    early = boundary < -EQUAL_S
-    both_ways = len(early) > 0 and float(early.mean()) > EARLIER
-    return same, bool(repeated and both_ways)
+    both_ways = (boundary < -EQUAL_S).mean() > EARLIER
+    return same, bool(fraction.mean() > 0.5 and both_ways)  # noqa: PLR2004
 
 
 def _typical(time: FloatArray, index: FloatArray) -> float:
@@ -434,13 +431,17 @@ def _least(time: FloatArray, index: FloatArray) -> float:
 def _local(steps: FloatArray) -> FloatArray:
     """Return the usual step around each, shape of ``steps``: a rate may change."""
     size = max(len(steps) // BLOCKS, 50)
-    count = max(len(steps) // size, 1)
-    blocks = np.array_split(steps, count)
-    middle = np.cumsum([len(block) for block in blocks]) - len(blocks[0]) / 2
-    usual = np.array([float(np.median(block)) for block in blocks])
+    middle, usual = _medians(steps, max(len(steps) // size, 1))
     mean = float(np.median(usual))
     usual[usual < BURST * mean] = mean
     return np.asarray(np.interp(np.arange(len(steps)), middle, usual))
+
+
+def _medians(values: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return the middles and medians of blocks."""
+    blocks = np.array_split(values, count)
+    middle = np.cumsum([len(block) for block in blocks]) - len(blocks[0]) / 2
+    return middle, np.array([float(np.median(block)) for block in blocks])
 
 
 def _is_shuffled(steps: FloatArray, in_order: FloatArray) -> bool:
@@ -458,7 +459,7 @@ def _rates(found: _Steps) -> tuple[float, ...]:
     """Return the rates at first and at last where they differ by more than stamps scatter."""
     edges = np.linspace(0, len(found.time) - 1, 41).astype(int)
     span = np.diff(found.index[edges])
-    if found.computed or len(span) < PIECES or (span <= 0).any():
+    if found.computed or (span <= 0).any():
         return ()
     if not (np.diff(found.flowed[edges]) > 0.0).all():  # stamps stood still, or went back
         return ()
@@ -490,28 +491,23 @@ def _noise(
     if found.computed:
         size = max(size, 20 * max(len(rest) // max(_boundaries(found), 1), 1))
     count = max(len(rest) // size, 1)
-    blocks = np.array_split(rest, count)
-    middle = np.cumsum([len(block) for block in blocks]) - len(blocks[0]) / 2
-    level = np.interp(np.arange(len(rest)), middle, [float(np.median(block)) for block in blocks])
+    middle, medians = _medians(rest, count)
+    level = np.interp(np.arange(len(rest)), middle, medians)
     apart = np.abs(rest - level)
     spread = float(np.quantile(apart, 0.95))
     if found.computed:
-        return (
-            float(np.quantile(apart, 0.975)) + abs(float(np.mean(rest - level))),
-            True,
-            False,
-            0.0,
-        )
+        late = float(np.quantile(apart, 0.975)) + abs(float(np.mean(rest - level)))
+        return late, True, False, 0.0
     if grid and spread <= WITHIN * grid:
         return 0.0, False, True, 0.0
     if spread < max(LEAST_NOISE_S, 0.005 * found.period):
         return 0.0, False, False, 0.0
     if arrival is not None and len(arrival) == len(rest) and found.time is time:
-        late = arrival - time + (rest - level)  # what arrival does on top of a steady clock
         own = rest - level
+        beside = arrival - time + own  # what arrival does on top of a steady clock
         near = apart < 4.0 * spread
-        share = float(own[near] @ (late - late.mean())[near]) / float(own[near] @ own[near])
-        doubt = float(late.std()) / (float(own[near].std()) * np.sqrt(near.sum()))
+        share = float(own[near] @ (beside - beside.mean())[near]) / float(own[near] @ own[near])
+        doubt = float(beside.std()) / (float(own[near].std()) * np.sqrt(near.sum()))
         if share + 3.0 * doubt < 1.0 - UNLIKE and share < UNLIKE:
             return spread, False, False, 0.0
     return 0.0, False, False, spread

@@ -87,8 +87,9 @@ class Holes:
 
     def pauses(self) -> "Holes":
         """Return those of a counter that are longer than by a poll that found no sample yet."""
-        at, usual, periods = (x[self.periods > 1.5] for x in (self.at, self.usual, self.periods))  # noqa: PLR2004
-        return Holes(at, periods, at >= 0, at < 0, usual)
+        long = self.periods > 1.5  # noqa: PLR2004
+        every = long[long]
+        return Holes(self.at[long], self.periods[long], every, ~every, self.usual[long])
 
     def lost(self, count: int) -> FloatArray:
         """Return how many samples were lost in each step, shape ``(count,)``."""
