@@ -6,7 +6,6 @@ import io
 import re
 import shutil
 import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -74,7 +73,8 @@ def everything(folder: Path) -> Lab:
             path.write_text(
                 f"# Fitted to session 1 of {name}.h5\noperator: {{}}\n", encoding="utf-8"
             )
-        command("replay", recording, "--measures", elsewhere / f"replay_{name}.csv")
+        measures = ("--measures", elsewhere / f"replay_{name}.csv")
+        command("replay", recording, "--run-recorded-code", *measures)
     if not any(map(missing, GRAPHICS)):
         shown = lab.folder / "shown.yaml"
         shown.write_text(f"{STUDY}{VIEW}", encoding="utf-8")
@@ -144,13 +144,6 @@ def opened(content: bytes) -> Iterator[str]:
             yield from names
     elif content[:4] == b"PAR1":
         yield parquet.read_table(io.BytesIO(content)).to_pandas().to_string()
-    elif content[:6] == b"MATLAB":
-        at = 128
-        while at + 8 <= len(content):
-            size = int.from_bytes(content[at + 4 : at + 8], "little")
-            packed = content[at + 8 : at + 8 + size]
-            yield zlib.decompress(packed).replace(b"\x00", b"").decode("latin-1")
-            at += 8 + size
 
 
 def says(path: Path, name: str) -> bool:
