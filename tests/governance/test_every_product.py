@@ -206,6 +206,7 @@ BY_OTHER_MEANS = {"score", "operator fit", "power"}
 
 IN_THE_DATA_FOLDER = {
     "run", "resume", "consent", "exclude", "note", "waive", "recover", "resync", "erase", "relabel",
+    "merge",
 }  # fmt: skip
 """They write recordings and the register, which is where erasing begins."""
 
