@@ -168,6 +168,18 @@ def test_markers_may_tell_of_what_happened_before(random):
     assert p95(correct(raw, MARKERS), stamped) < 5e-6
 
 
+@pytest.mark.parametrize("late_s", [0.4, 2.0, 30.0])
+def test_samples_that_a_device_held_back_are_not_moved(random, late_s):
+    """With 2 s they were taken for another clock's, and moved by 2 s where 0.1 s were stated."""
+    times = regular()
+    honest = source(SourceClock(), times, random)
+    held = honest.arrivals + np.array([0.0, late_s])
+    corrected = correct(RawStream.of(honest.stamps, honest.probes, held), REGULAR)
+    assert corrected.quality.whose == ""
+    assert np.abs(corrected.time - times).max() < 1e-5
+    assert corrected.quality.error_p95_s == pytest.approx(late_s, rel=0.05)
+
+
 @pytest.mark.parametrize("foreign", [1.7e9, -40_000.0])
 def test_stamps_of_a_clock_that_lsl_does_not_know_are_told(random, foreign):
     """Some programs stamp with the time of day, or with what the device counts."""

@@ -48,7 +48,11 @@ ONE_IN = 1000
 """One of so many pulls may show a lag by chance."""
 
 SOON = 0.02
-FOREIGN_S = 1.0
+FOREIGN_S = 60.0
+"""No device holds its samples back for longer. Up to then a stamp that is older than its arrival
+may be right, and the probes agree that it is: the lag is stated, and nothing is moved.
+"""
+
 PULL_S = 0.03
 BLOCK_S = 10.0
 LAG_BLOCK_S, LAG_BLOCK = 30.0, 40
