@@ -206,6 +206,11 @@ _ROWS = (
        _CONTROL, "{text} is started again", "actions"),
     _E("order.without", 111, "the experimenter goes on without a view or sound",
        _CONTROL, "the session goes on without {text}", "actions"),
+    _E("drt.stimulus", 112, "a stimulus of a detection response task is on",
+       ("Sensory-event", "Cue"), task=True),
+    _E("drt.response", 113, "the operator responds to a stimulus",
+       (*_ANSWERED, "(Press, Push-button)"), task=True),
+    _E("drt.outcome", 114, "the time for a response to a stimulus is over", _MEASURED, task=True),
     # Not markers: recorded beside the frames, or told to people alone.
     _E("session.standing", None, "how many trials were completed before",
        _STRUCTURE, "{done} trials were completed earlier"),

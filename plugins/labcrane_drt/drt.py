@@ -18,6 +18,10 @@ class Drt(SecondaryTask):
     The intervals go on from one trial to the next, as long as no tick is missing between them. A
     pause, a fault, a break or a question ends the stimulus under way without an outcome; the next
     one comes an interval after the end of the interruption.
+
+    A stimulus has an outcome only when all of the time for a response was watched, whatever the
+    response. Hits that count at once, beside misses that need that time, would raise the hit rate
+    of short trials.
     """
 
     signals = (
@@ -41,6 +45,7 @@ class Drt(SecondaryTask):
         self._next = 0
         self._onset = -1
         self._waiting = self._on = self._down = False
+        self._answered = np.nan
         self._stimulus = 0
         self._status, self._said = TrialStatus(Phase.RUNNING, np.zeros(2)), (False, False)
         self._outcomes: dict[str, list[float]] = {}
@@ -69,15 +74,18 @@ class Drt(SecondaryTask):
         if pressed:
             events.append(Event("drt.response", tick.due, {"stimulus": self._stimulus}))
             self._on = False
-        if self._waiting and (pressed or since > settings.hit_s[1]):
+            self._answered = np.fmin(self._answered, since)
+        if self._waiting and since > settings.hit_s[1]:
             least, most = settings.hit_s
-            outcome = "miss" if since > most else "cheat" if since < least else "hit"
-            events.append(self._decided(tick.due, outcome, since))
+            answered = self._answered
+            outcome = "cheat" if answered < least else "hit" if answered <= most else "miss"
+            events.append(self._decided(tick.due, outcome, answered))
         if self._on and since >= settings.longest_s:
             self._on = False
         if tick.number >= self._next:
             self._stimulus += 1
             self._onset, self._on, self._waiting = tick.number, True, True
+            self._answered = np.nan
             self._next = self._after(tick.number)
             events.append(Event("drt.stimulus", tick.due, {"stimulus": self._stimulus}))
         if events or (self._on, self._down) != self._said:

@@ -84,13 +84,12 @@ def by_the_standard(onsets: list[int], presses: list[int], until: int) -> list[s
     """Return the outcome of each stimulus that can be judged: a reading that shares no code."""
     found = []
     for number, onset in enumerate(onsets):
+        if (until - onset) / RATE_HZ <= 2.5:  # a miss could not be told from a late hit
+            continue
         following = onsets[number + 1] if number + 1 < len(onsets) else 10**9
         after = [(p - onset) / RATE_HZ for p in presses if onset < p <= following]
         first = min(after, default=99.0)
-        if first <= 2.5:
-            found.append("cheat" if first < 0.1 else "hit")
-        elif (until - onset) / RATE_HZ > 2.5:
-            found.append("miss")
+        found.append("miss" if first > 2.5 else "cheat" if first < 0.1 else "hit")
     return found
 
 
@@ -178,3 +177,18 @@ def test_the_interval_goes_on_from_one_trial_to_the_next() -> None:
 def test_a_response_that_could_be_of_two_stimuli_is_refused() -> None:
     with pytest.raises(ValidationError, match="write a longer interval_s"):
         DrtSettings(interval_s=(2.0, 3.0))
+
+
+def test_short_trials_do_not_raise_the_hit_rate() -> None:
+    """Hits that counted at once, beside misses that need 2.5 s, gave 0.84 where 0.7 is true."""
+    random, found = np.random.default_rng(5), {"hits": 0, "misses": 0}
+    for seed in range(400):
+        trial = range(int(7.0 * RATE_HZ))  # and a gap before the next one
+        onsets = Course(trial, never, seed).onsets
+        hit = {onset + int(0.5 * RATE_HZ) for onset in onsets if random.random() < 0.7}
+        course = Course(trial, hit.__contains__, seed)
+        for name in found:
+            found[name] += course.measured[name]
+    judged = found["hits"] + found["misses"]
+    assert judged > 40
+    assert abs(found["hits"] / judged - 0.7) < 3.0 * np.sqrt(0.7 * 0.3 / judged)

@@ -43,7 +43,7 @@ BY_ANOTHER_RULE = {"reaction_time", "movement_time", "path_length"}
 """What is measured otherwise since: from the first onset, not from that of the fastest stroke."""
 ONSET = "movement.onset"
 """It is told as soon as it is known since, and no more with the trial's end."""
-ADDED_SETTINGS = {"axes": [], "button": None}
+ADDED_SETTINGS = {"axes": [], "button": None, "response": None}
 """What the simulated operator can be told since, and what that is where it is not."""
 DEFINITION = "definition"
 """What columns of the loop and of all trials say of themselves since."""
