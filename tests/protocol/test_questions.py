@@ -744,3 +744,23 @@ def test_groups_and_conditions_that_readers_take_for_numbers_are_asked_about(
             found = [each.text for each in questions(study) if "guess types" in each.text]
             assert bool(found) == asked
             assert all(repr(each) in found[0] for each in numbers if asked)
+
+
+@pytest.mark.parametrize(
+    ("dual", "said"),
+    [
+        ("[drt]", ["'drt' is on without a feedback that presents it; add one of beep, light; is that meant?"]),
+        ("[light]", ["'light' presents 'drt', which is off; add drt, or leave it out; is that meant?"]),
+        ("[drt, light]", []),
+    ],
+)
+def test_a_secondary_task_is_on_with_what_presents_it(
+    dual: str, said: list[str], tmp_path: Path
+) -> None:
+    example = Path(__file__).parents[2] / "examples" / "workload"
+    copytree(example, tmp_path / "study")
+    path = tmp_path / "study" / "protocol.yaml"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("with light: [drt, light]", f"with light: {dual}"), "utf-8")
+    asked = [one.text for one in questions(load(path, discover()))]
+    assert [text for text in asked if "drt" in text and "present" in text] == said

@@ -91,3 +91,18 @@ def test_correlations_are_within_persons() -> None:
 def test_the_figure_has_a_row_for_each_person() -> None:
     figure = load(load_table(movements(), scores())).figure
     assert len(figure.axes) == 2 * 4
+
+
+def test_a_result_of_a_plugin_that_is_called_so_is_no_detection_response_task() -> None:
+    own = movements().rename(columns={"drt_hit_rate": "mine_hit_rate"})
+    assert load_table(own, scores()).empty
+
+
+def test_a_response_time_is_the_mean_of_hits_and_not_of_movements() -> None:
+    own = movements()
+    own["drt_hits"] = np.where(own.index % 2, 9.0, 1.0)
+    own["drt_response_time"] = np.where(own.index % 2, 0.3, 1.3)
+    dual = own[(own["condition"] == "dual") & (own["participant"] == own["participant"][0])]
+    expected = (dual["drt_hits"] * dual["drt_response_time"]).sum() / dual["drt_hits"].sum()
+    row = row_of(load_table(own, scores()), "drt_response_time", "dual")
+    assert row["mean"] == pytest.approx(expected)

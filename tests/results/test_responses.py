@@ -35,6 +35,7 @@ def a_session(
         ("trial.start", 0.0, {"trial": 1, "attempt": 1, "block": 1, "practice": False})
     ]
     rows[0][2]["feedback"] = "drt+light+beep"
+    rows.append(("feedback.ready", 0.0, {"what": "screen"}))
     for number, (sent, responded) in enumerate(stimuli.items(), start=1):
         about = {"secondary": "drt", "stimulus": number}
         rows.append(("drt.stimulus", sent, about))
@@ -42,6 +43,7 @@ def a_session(
             rows.append(("drt.response", responded, about))
         outcome = "held" if sent in held else "hit"  # what the session could say then
         rows.append(("drt.outcome", sent + 2.6, {**about, "outcome": outcome}))
+    rows.append(("trial.end", 99.0, {**rows[0][2], "counted": True, "outcome": "success"}))
     settings = {"hit_s": (0.1, 2.5), "longest_s": 1.0}
     presenter = {"settings": {"stimulus": "drt.stimulus"}}
     components = {
@@ -91,3 +93,21 @@ def test_a_late_picture_can_turn_a_miss_into_a_hit() -> None:
     found = responses(a_session({1.0: 3.52}, {"screen": a_log(0.1, range(3000))}))
     assert found["outcome"].tolist() == ["hit"]
     assert found["response_time"][0] == pytest.approx(2.42)
+
+
+def test_a_sound_that_never_started_is_not_replaced_by_pictures() -> None:
+    session = a_session({1.0: 1.5}, {"screen": a_log(0.0, range(3000))})
+    del session.context["components"]["feedback.light"]
+    lost = pd.DataFrame([("feedback.lost", 0.0, {"what": "beep"})], columns=session.events.columns)
+    session.events = pd.concat([lost, session.events], ignore_index=True)
+    assert responses(session)["outcome"].tolist() == ["not shown"]
+
+
+def test_only_trials_that_count_are_measured() -> None:
+    session = a_session({1.0: 1.5}, {"screen": a_log(0.0, range(3000))})
+    assert measures_by(responses(session), ["block"])["hits"].tolist() == [1]
+    session.events.loc[session.events["name"] == "trial.end", "data"] = [
+        {"trial": 1, "attempt": 1, "counted": True, "outcome": "repeated"}
+    ]
+    assert responses(session)["counted"].tolist() == [0.0]
+    assert measures_by(responses(session), ["block"]).empty

@@ -20,8 +20,9 @@ def load_table(results: "pd.DataFrame", scores: "pd.DataFrame") -> "pd.DataFrame
     """Return mean, 95 % interval and n of each measure, person and condition.
 
     Measures are the scores of the NASA-TLX, the responses of secondary tasks, and how the sticks
-    were worked. Intervals are by t over movements; of hit rates, which are of all stimuli of a
-    condition, after Wilson. Empty without conditions or without a secondary task.
+    were worked. Response times are means of all hits of a condition, and hit rates of all its
+    stimuli. Intervals are by t over movements, and of hit rates after Wilson. Empty without
+    conditions or without a secondary task.
 
     Parameters
     ----------
@@ -34,7 +35,12 @@ def load_table(results: "pd.DataFrame", scores: "pd.DataFrame") -> "pd.DataFrame
     from scipy.stats import t
 
     columns = [str(name) for name in results]
-    rates = [name for name in columns if name.endswith(RATE)]
+    of_drt = [name.removesuffix(RATE) for name in columns if name.endswith(RATE)]
+    rates = [
+        name + RATE
+        for name in of_drt  # a plugin may call a result of its own so
+        if {name + kind for kind in (TIME, "_hits", "_misses")} <= {*columns}
+    ]
     asked = [name.replace(RATE, TIME) for name in rates]
     if CONDITION not in results or not rates:
         return pd.DataFrame()
@@ -51,8 +57,21 @@ def load_table(results: "pd.DataFrame", scores: "pd.DataFrame") -> "pd.DataFrame
     table = cells.agg(mean="mean", sd="std", n="count").reset_index()
     quantile = t.ppf(0.975, np.maximum(table["n"] - 1, 1))
     reach = (quantile * table.pop("sd") / np.sqrt(table["n"])).where(table["n"] >= FEWEST)
+    for rate, time in zip(rates, asked, strict=True):
+        _weigh(table, results, time, rate.replace(RATE, "_hits"), keys)
     table = table.assign(ci_low=table["mean"] - reach, ci_high=table["mean"] + reach)
     return pd.concat([table, *(_rates(results, name, keys) for name in rates)], ignore_index=True)
+
+
+def _weigh(
+    table: "pd.DataFrame", results: "pd.DataFrame", time: str, hits: str, keys: list[str]
+) -> None:
+    """Let each mean of a response time be that of hits, not of movements with few or many."""
+    known = results[[*keys, time, hits]].dropna()
+    totals = known.assign(total=known[time] * known[hits]).groupby(keys)[["total", hits]].sum()
+    own = table["measure"] == time
+    cells = totals.reindex(list(zip(*(table.loc[own, key] for key in keys), strict=True)))
+    table.loc[own, "mean"] = (cells["total"] / cells[hits]).to_numpy()
 
 
 def _rates(results: "pd.DataFrame", rate: str, keys: list[str]) -> "pd.DataFrame":

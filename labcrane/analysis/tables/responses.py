@@ -7,6 +7,7 @@ import numpy as np
 
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.presented import operators_views
+from labcrane.core.records import is_done
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.recording.pictures import LOG
 from labcrane.types import FloatArray
@@ -29,6 +30,7 @@ MEANING = {
     "attempt": ("", "number of the attempt at that trial"),
     "practice": ("", "1 where the block was practice, else 0"),
     "condition": ("", "the condition within participants; empty without one"),
+    "counted": ("1", "1 where the trial was done, counts, and is no practice, else 0"),
     "sent": ("s", "when the session switched the stimulus on, on its own clock"),
     "shown": ("s", "when a view or sound had presented it, by its own record; empty without one"),
     "responded": ("s", "the first response before the next stimulus; empty without one"),
@@ -53,9 +55,21 @@ def responses(session: SessionRecord, display_delay_s: float = 0.0) -> "pd.DataF
     import pandas as pd
 
     rows = _recorded(session)
+    done = _done(session)
     for row in rows:
         _judge(row, session, display_delay_s)
+        row["counted"] = float((row["trial"], row["attempt"]) in done)
     return pd.DataFrame(rows, columns=list(MEANING))
+
+
+def _done(session: SessionRecord) -> set[tuple[int, int]]:
+    """Return the trials and attempts that count."""
+    found = set()
+    events = session.events
+    for data in events["data"][events["name"] == "trial.end"]:
+        if is_done(data):
+            found.add((data["trial"], data["attempt"]))
+    return found
 
 
 def _recorded(session: SessionRecord) -> list[dict[str, Any]]:
@@ -79,7 +93,9 @@ def _recorded(session: SessionRecord) -> list[dict[str, Any]]:
             if name == RESPONSE:
                 row.setdefault("responded", time)
             else:
-                row |= {"outcome": data["outcome"], **_of(about)}
+                row["outcome"] = data["outcome"]
+                if row["outcome"] != HELD:  # it is noticed later, perhaps in another block
+                    row |= _of(about)
     return rows
 
 
@@ -95,12 +111,12 @@ def _judge(row: dict[str, Any], session: SessionRecord, display_delay_s: float) 
     responded = row.setdefault("responded", np.nan)
     until = np.fmin(row["sent"] + settings["longest_s"], responded)
     logs = _logs(session, row)
-    shown = [_shown(session, log, row["sent"], until, display_delay_s) for log in logs]
+    shown = [_shown(session, log, row["sent"], until, display_delay_s) for log in logs or ()]
     row["shown"] = float(np.fmin.reduce(shown)) if shown else np.nan
-    row["response_time"] = responded - (row["shown"] if shown else row["sent"])
+    row["response_time"] = responded - (row["sent"] if logs is None else row["shown"])
     if row["outcome"] == HELD:
         row["response_time"] = np.nan
-    elif shown and np.isnan(row["shown"]):
+    elif logs is not None and np.isnan(row["shown"]):
         row["outcome"] = NOT_SHOWN
     elif row["response_time"] < least:
         row["outcome"] = CHEAT
@@ -108,16 +124,24 @@ def _judge(row: dict[str, Any], session: SessionRecord, display_delay_s: float) 
         row["outcome"] = HIT if row["response_time"] <= most else MISS
 
 
-def _logs(session: SessionRecord, row: Mapping[str, Any]) -> list[str]:
-    """Return the streams in which its presentation is recorded."""
+def _logs(session: SessionRecord, row: Mapping[str, Any]) -> list[str] | None:
+    """Return the streams that record its presentation; None where nothing was presented at all.
+
+    A sound that never started has none, and is not replaced by the pictures of a view.
+    """
     components = session.context["components"]
+    events = session.events
+    told = events["data"][events["name"].isin(["feedback.ready", "feedback.lost"])]
+    started = {str(data["what"]) for data in told}
+    if not started and not any(name.startswith(LOG) for name in session.streams):
+        return None
     names: list[str] = []
     for part, choice in components.items():
         kind, _, name = part.partition(".")
         of = choice.get("settings", {}).get("stimulus")
         on = name in str(row["feedback"]).split("+")
         if kind == "feedback" and on and of == f"{row['secondary']}.stimulus":
-            own = LOG + name in session.streams
+            own = name in started or LOG + name in session.streams
             names += [name] if own else operators_views(components)
     return [LOG + name for name in names if LOG + name in session.streams]
 
@@ -160,12 +184,12 @@ def measured(rows: "pd.DataFrame") -> dict[str, float]:
 def measures_by(rows: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
     """Return the measures of each block, condition or movement, with ``n`` stimuli.
 
-    Practice is left out unless ``by`` has it.
+    Only trials that count, as in the report, unless ``by`` has ``practice`` or ``counted``.
     """
     import pandas as pd
 
-    if "practice" not in by:
-        rows = rows[rows["practice"].astype(float) != 1.0]
+    if not {"practice", "counted"} & {*by}:
+        rows = rows[rows["counted"] == 1.0]
     keys = ["secondary", *by]
     found: list[dict[str, Any]] = [
         {**dict(zip(keys, key, strict=True)), "n": len(own), **measured(own)}

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from labcrane.analysis.presented import operators_views
 from labcrane.core.settings import Within
+from labcrane.core.signals import Signal
 from labcrane.files.yaml import Place
 from labcrane.protocol.questions.question import (
     Doubts,
@@ -40,6 +41,45 @@ def _of_feedback(study: Study) -> Doubts:
         if name not in used:
             key = "secondary" if name in protocol.secondary else "feedback"
             yield (key, name), f"{key} {name!r} is never switched on"
+
+
+@asks
+def _of_what_presents(study: Study) -> Doubts:
+    """Question a secondary task without what presents it, and what presents one that is off."""
+    shown = {
+        name: {str(of).partition(".")[0] for _, of in choice.settings if isinstance(of, str)}
+        for name, choice in (study.cues | study.sounds).items()
+    }
+    presented = {of for all_of in shown.values() for of in all_of} & {*study.secondary}
+    for place, names in _switched_together(study):
+        for name in names:
+            if name in presented and not any(name in shown.get(one, ()) for one in names):
+                yield (
+                    place,
+                    f"{name!r} is on without a feedback that presents it; add one of "
+                    f"{', '.join(sorted(one for one in shown if name in shown[one]))}",
+                )
+            for of in shown.get(name, set()) & {*study.secondary} - {*names}:
+                yield place, f"{name!r} presents {of!r}, which is off; add {of}, or leave it out"
+    for name in {*study.secondary} - presented:
+        if any(signal.name == f"{name}.stimulus" for signal in _signals(study)):
+            yield ("secondary", name), f"no feedback presents {name}.stimulus; add one with it"
+
+
+def _switched_together(study: Study) -> Iterator[tuple[Place, Sequence[str]]]:
+    """Yield the lists of what is on together, and where each is written."""
+    for key in ("conditions", "groups"):
+        for name, on in getattr(study.protocol.design, key).items():
+            if isinstance(on, tuple):
+                yield ("design", key, name), on
+    for place, block in blocks_in(study):
+        if isinstance(block.feedback, tuple):
+            yield (*place, "feedback"), block.feedback
+
+
+def _signals(study: Study) -> Iterator[Signal]:
+    for task in study.tasks.values():
+        yield from task.signals
 
 
 @asks
