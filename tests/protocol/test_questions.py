@@ -749,8 +749,16 @@ def test_groups_and_conditions_that_readers_take_for_numbers_are_asked_about(
 @pytest.mark.parametrize(
     ("dual", "said"),
     [
-        ("[drt]", ["'drt' is on without a feedback that presents it; add one of beep, light; is that meant?"]),
-        ("[light]", ["'light' presents 'drt', which is off; add drt, or leave it out; is that meant?"]),
+        (
+            "[drt]",
+            [
+                "'drt' is on without a feedback that presents it; add one of beep, light; is that meant?"
+            ],
+        ),
+        (
+            "[light]",
+            ["'light' presents 'drt', which is off; add drt, or leave it out; is that meant?"],
+        ),
         ("[drt, light]", []),
     ],
 )
