@@ -29,7 +29,7 @@ class DrtSettings(Settings):
     until then is a miss."""
 
     def needs(self, machine: Machine) -> Names:
-        return {"axis": [self.response]}
+        return {"axis": [self.response.removeprefix("-")]}
 
     def provides(self, machine: Machine) -> Names:
         return {"event": ["drt.stimulus", "drt.response", "drt.outcome"], "object": ()}

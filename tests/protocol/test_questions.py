@@ -746,6 +746,20 @@ def test_groups_and_conditions_that_readers_take_for_numbers_are_asked_about(
             assert all(repr(each) in found[0] for each in numbers if asked)
 
 
+@pytest.mark.parametrize(("axis", "asked"), [("left.x", 1), ("-left.y", 1), ("left.trigger", 0)])
+def test_a_response_that_moves_the_machine_is_asked_about(
+    axis: str, asked: int, tmp_path: Path
+) -> None:
+    copytree(Path(__file__).parents[2] / "examples" / "workload", tmp_path / "study")
+    path = tmp_path / "study" / "protocol.yaml"
+    text = path.read_text(encoding="utf-8")
+    assert "response: left.trigger" in text
+    path.write_text(text.replace("response: left.trigger", f"response: {axis}"), "utf-8")
+    found = [one.text for one in questions(load(path, discover()))]
+    bare = axis.removeprefix("-")
+    assert sum(f"'drt' uses {bare}, which moves the machine, too" in one for one in found) == asked
+
+
 @pytest.mark.parametrize(
     ("dual", "said"),
     [

@@ -4,9 +4,11 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from labcrane.analysis.presented import operators_views
+from labcrane.core.references import Reference, mentioned
 from labcrane.core.settings import Within
 from labcrane.core.signals import Signal
 from labcrane.files.yaml import Place
+from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.questions.question import (
     Doubts,
     asks,
@@ -18,6 +20,9 @@ from labcrane.recording.pictures import RATE_S
 
 SWITCHES = ("all", "none", "group")
 """Values of ``feedback:`` of a step that are not names."""
+
+OF_THE_INPUT = (Reference("axis", signed=True), Reference("button"))
+"""Marks of settings that name an axis or a button of the input."""
 
 Facts = Mapping[str, float]
 """Largest distance, in metres, at which each fact about the error is shown; infinity without
@@ -64,6 +69,28 @@ def _of_what_presents(study: Study) -> Doubts:
     for name in {*study.secondary} - presented:
         if any(signal.name == f"{name}.stimulus" for signal in _signals(study)):
             yield ("secondary", name), f"no feedback presents {name}.stimulus; add one with it"
+
+
+@asks
+def _of_what_responds(study: Study) -> Doubts:
+    """Question a response that moves the machine as well."""
+    moving = _axes(study, study.scheme)
+    for name, choice in study.secondary.items():
+        for axis in sorted(_axes(study, choice) & moving):
+            yield (
+                ("secondary", name),
+                f"{name!r} uses {axis}, which moves the machine, too; use a button or a pedal",
+            )
+
+
+def _axes(study: Study, choice: ComponentSpec) -> set[str]:
+    """Return the axes of the input that a component names, written or by default."""
+    needed = choice.settings.needs(study.machine)
+    named = [
+        *(str(each.value) for each in mentioned(choice.settings) if each.mark in OF_THE_INPUT),
+        *(name for kind in ("axis", "button") for name in needed.get(kind, ())),
+    ]
+    return {name.removeprefix("-") for name in named}
 
 
 def _switched_together(study: Study) -> Iterator[tuple[Place, Sequence[str]]]:
