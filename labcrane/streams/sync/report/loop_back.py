@@ -89,7 +89,7 @@ def judge_loop_back(
     names
         Stream, channel, and the view or sound.
     changes
-        As the view or sound logged them.
+        As the view or sound logged them; those outside the recorded signal are left out.
     signal
         Times on our clock, and values, both of shape ``(n,)``.
     stated_s
@@ -98,6 +98,14 @@ def judge_loop_back(
         Whether it is a photodiode; otherwise it hears or feels.
     """
     times, values = signal
+    changes = [one for one in changes if len(times) and times[0] <= one.time <= times[-1]]
+    if not changes:
+        finding = Finding(
+            Verdict.WARN,
+            f"{names[2]} did not change while {names[1]} was recorded",
+            "let it change on events of the session, and start the device before it",
+        )
+        return LoopBack(*names, stated_s, Verdict.WARN, findings=(finding,))
     late = np.array(
         [_late(one, after, times, values, light=light) for one, after in _spans(changes)]
     )
