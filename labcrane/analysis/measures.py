@@ -34,6 +34,7 @@ from labcrane.analysis.sticks import (
     steering_entropy,
     stick_use,
 )
+from labcrane.analysis.tables.body import MEASURED, Body
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.analysis.tables.measure_cache import kept
 from labcrane.analysis.tables.responses import STIMULUS, in_trials, responses
@@ -192,6 +193,7 @@ def measure_session(
     machine = machine_of(session)
     rate_hz = float(session.attrs["rate_hz"])
     seen = looks(session, settings.display_delay_s, settings.gaze_stream, settings.gaze_eye)
+    body = Body(session)
     rows, recorded = [], []
     errors: list[FloatArray] = []
     for each in cut(frames, trials, rate_hz) if frames else movements_of(session):
@@ -206,6 +208,10 @@ def measure_session(
                 seen, due[0], due[span.start], due[span.stop - 1], settings.look_least_s,
                 movement.pauses,
             )  # fmt: skip
+        row |= dict.fromkeys(MEASURED, float("nan"))
+        if span is not None:
+            due = movement.due
+            row |= body.measures(due[span.start], due[span.stop - 1], movement.pauses)
         rows.append(row)
     measured = pd.DataFrame(rows, index=trials.index)
     usual = float(np.quantile(np.abs(np.concatenate(errors)), 0.9)) if any(map(len, errors)) else 0

@@ -57,6 +57,16 @@ MEASURES: Mapping[str, tuple[str, str]] = {
         "entropy of the errors of a prediction of the stick axes, 0 to 1; compared with all "
         "movements of the session",
     ),
+    "heart_rate": (
+        "1/min",
+        "mean of the channel of beats per minute from onset to offset; only where one stream has "
+        "it",
+    ),
+    "pupil": (
+        "",
+        "mean size of the pupils from onset to offset, without blinks, in the unit of their "
+        "stream; light changes it as well as load; only where one stream has it",
+    ),
     "coordination": (
         "1",
         "largest cross-correlation of both sticks' deflections, up to half a second apart",

@@ -10,7 +10,9 @@ from labcrane.analysis.report.factors import CONDITION
 if TYPE_CHECKING:
     import pandas as pd
 
-HANDS = ("duty_cycle", "aggressiveness", "steering_entropy")
+BODY = ("duty_cycle", "aggressiveness", "steering_entropy", "heart_rate", "pupil")
+"""Measures of movements beside those of tasks and questionnaires."""
+
 RATE, TIME = "_hit_rate", "_response_time"
 FEWEST = 3
 """With fewer values of a person in a condition there is no interval."""
@@ -19,10 +21,10 @@ FEWEST = 3
 def load_table(results: "pd.DataFrame", scores: "pd.DataFrame") -> "pd.DataFrame":
     """Return mean, 95 % interval and n of each measure, person and condition.
 
-    Measures are the scores of the NASA-TLX, the responses of secondary tasks, and how the sticks
-    were worked. Response times are means of all hits of a condition, and hit rates of all its
-    stimuli. Intervals are by t over movements, and of hit rates after Wilson. Empty without
-    conditions or without a secondary task.
+    Measures are the scores of the NASA-TLX, the responses of secondary tasks, how the sticks were
+    worked, and heart rate and pupil where they were recorded. Response times are means of all hits
+    of a condition, and hit rates of all its stimuli. Intervals are by t over movements, and of hit
+    rates after Wilson. Empty without conditions or without a secondary task.
 
     Parameters
     ----------
@@ -45,8 +47,8 @@ def load_table(results: "pd.DataFrame", scores: "pd.DataFrame") -> "pd.DataFrame
     if CONDITION not in results or not rates:
         return pd.DataFrame()
     keys = ["participant", CONDITION]
-    of_hands = [name for name in HANDS if name in results]
-    long = [results.melt(keys, [*asked, *of_hands], "measure")]
+    of_body = [name for name in BODY if name in results]
+    long = [results.melt(keys, [*asked, *of_body], "measure")]
     if len(scores):
         tlx = scores[scores["version"].str.startswith("nasa_tlx ") & (scores[CONDITION] != "")]
         named = "TLX " + tlx["score"].astype(str)
