@@ -152,6 +152,8 @@ def stick_rates(axis: FloatArray, rate_hz: float, window_s: float) -> FloatArray
     It is the change over a window, which is shorter at both ends. A rate from one sample to the
     next would grow with the sampling rate wherever the axis has steps.
     """
+    if len(axis) < 2:  # noqa: PLR2004 - no change can be seen
+        return np.full(len(axis), np.nan)
     times = np.arange(len(axis)) / rate_hz
     before = np.maximum(times - window_s / 2.0, 0.0)
     after = np.minimum(times + window_s / 2.0, times[-1])

@@ -23,6 +23,7 @@ WHY_NOT: Mapping[str, str] = {
     "press_s": "of no consequence for a movement",
     "axes": "the study's devices say which there are",
     "button": "the study's devices say which there is",
+    "response": "responses to a second task are not looked at",
 }
 """Why a setting has no value from a recording; it keeps its default."""
 

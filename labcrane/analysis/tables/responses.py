@@ -30,7 +30,7 @@ MEANING = {
     "attempt": ("", "number of the attempt at that trial"),
     "practice": ("", "1 where the block was practice, else 0"),
     "condition": ("", "the condition within participants; empty without one"),
-    "counted": ("1", "1 where the trial was done, counts, and is no practice, else 0"),
+    "counted": ("1", "1 where the trial was done and counts, and 0 in practice as well"),
     "sent": ("s", "when the session switched the stimulus on, on its own clock"),
     "shown": ("s", "when a view or sound had presented it, by its own record; empty without one"),
     "responded": ("s", "the first response before the next stimulus; empty without one"),

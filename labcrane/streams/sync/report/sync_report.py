@@ -67,7 +67,7 @@ class SyncReport:
     interrupted
         Findings on movements that were paused after a view or sound had failed.
     loop_back
-        What photodiodes and microphones say of the streams that recorded them.
+        What photodiodes and microphones show of the streams that recorded them.
     """
 
     streams: tuple[StreamReport, ...]
