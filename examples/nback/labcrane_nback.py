@@ -96,8 +96,12 @@ class Nback(SecondaryTask):
         Signal("pressed", "1"),
     )
     results = (
-        Signal("hit_share", "1", definition="share of the matches that were answered by a press"),
-        Signal("false_share", "1", definition="share of the other balls that were, too"),
+        Signal(
+            "hit_share",
+            "1",
+            definition="share of the matches with a press; a ball cut off at the end is left out",
+        ),
+        Signal("false_share", "1", definition="share of the other balls with one"),
     )
 
     def __init__(self, settings: NbackSettings) -> None:
@@ -132,7 +136,9 @@ class Nback(SecondaryTask):
         return TrialStatus(Phase.RUNNING, values, tuple(events))
 
     def measure(self) -> Mapping[str, Value]:
-        answered = np.array(self._answered)
+        # A ball that the end of the trial cuts off was perhaps still to be answered.
+        whole = int(round(self._ticks / self._rate_hz / self._settings.period_s, 9))
+        answered = np.array(self._answered[:whole], np.bool_)
         matches = np.array(self._order.matches[: len(answered)])
         parts = {"hit_share": answered[matches], "false_share": answered[~matches]}
         return {name: float(part.mean()) if part.size else None for name, part in parts.items()}

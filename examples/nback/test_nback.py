@@ -46,3 +46,15 @@ def test_a_press_at_every_match_is_a_hit_and_no_other_press() -> None:
     balls = [event.data["place"] for event in said if event.name == "nback.ball"]
     assert balls == list(order(settings, 1).places[:40])
     assert all(event.data["right"] for event in said if event.name == "nback.press")
+
+
+def test_a_ball_that_the_end_of_the_trial_cuts_off_is_not_counted() -> None:
+    run, settings = make_run(ch8()), NbackSettings(period_s=0.5)
+    seed = next(k for k in range(99) if order(settings, k).matches[2:4] == (True, True))
+    with opened(nback := Nback(settings), run):
+        nback.begin_trial(make_trial(seed=seed))
+        for number in range(3 * 120 + 60):  # three balls, and half of a fourth
+            frame = make_frame(run, number)
+            frame.axes[run.axes.index("right.trigger")] = float(number == 300)
+            nback.evaluate(frame)
+        assert nback.measure() == {"hit_share": 1.0, "false_share": 0.0}

@@ -258,7 +258,7 @@ BINS = np.array([-5.0, -2.5, -1.0, -0.5, 0.5, 1.0, 2.5, 5.0])
 """Edges of its nine bins, in 90th percentiles of the error."""
 
 FEWEST_ERRORS = 10
-"""With fewer errors of prediction there is no entropy of a movement."""
+"""A movement with fewer errors of prediction has no entropy."""
 
 
 def prediction_errors(axis: FloatArray, rate_hz: float) -> FloatArray:

@@ -307,7 +307,7 @@ def test_a_hole_that_may_be_a_poll_without_a_sample_leaves_a_period_open(
     }  # fmt: skip
     corrected = correct(clock(stamped), **given)
     assert np.mean(np.abs(corrected.time - t) <= corrected.error) >= 0.995
-    # Samples that are lost at random, or several at once, are no such polls.
+    # Samples lost at random, or several at once, are not taken for such polls.
     lost = [9_000, 9_100, 31_000, 31_001, 31_002, 47_000]
     kept = np.delete(t, lost)
     given["latency_s"] = 0.0

@@ -38,7 +38,7 @@ class MyPart(SecondaryTask):
     # What happens every tick: cues and sounds present it, and it is recorded.
     signals = (Signal("period", "1"), Signal("pressed", "1"))
     # What a finished trial is measured by.
-    results = (Signal("share", "1", definition="share of the periods with a press"),)
+    results = (Signal("share", "1", definition="share of the whole periods with a press"),)
 
     def __init__(self, settings: MyPartSettings) -> None:
         self._settings = settings
@@ -59,8 +59,10 @@ class MyPart(SecondaryTask):
         return TrialStatus(Phase.RUNNING, np.array([period, down], np.float64))
 
     def measure(self) -> Mapping[str, Value]:
-        periods = 1 + self._ticks // self._ticks_of_a_period
-        return {"share": len(self._pressed) / periods}
+        # The end of the trial may cut the last one off, before its press.
+        whole = self._ticks // self._ticks_of_a_period
+        pressed = sum(period < whole for period in self._pressed)
+        return {"share": pressed / whole if whole else None}
 
 
 @hookimpl
