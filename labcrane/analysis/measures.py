@@ -34,7 +34,7 @@ from labcrane.analysis.sticks import (
     steering_entropy,
     stick_use,
 )
-from labcrane.analysis.tables.body import MEASURED, Body
+from labcrane.analysis.tables.body import MEASURED, BodySignals
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.analysis.tables.measure_cache import kept
 from labcrane.analysis.tables.responses import STIMULUS, in_trials, responses
@@ -193,7 +193,7 @@ def measure_session(
     machine = machine_of(session)
     rate_hz = float(session.attrs["rate_hz"])
     seen = looks(session, settings.display_delay_s, settings.gaze_stream, settings.gaze_eye)
-    body = Body(session)
+    body = BodySignals(session)
     rows, recorded = [], []
     errors: list[FloatArray] = []
     for each in cut(frames, trials, rate_hz) if frames else movements_of(session):

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labcrane.analysis.tables.body import Body
+from labcrane.analysis.tables.body import BodySignals
 
 
 def a_stream(time: np.ndarray, **channels: np.ndarray) -> Any:
@@ -27,7 +27,7 @@ def test_heart_rate_and_pupil_are_means_from_onset_to_offset_without_blinks_and_
     left, right = random.uniform(2.0, 5.0, (2, len(looks)))
     left[1000:1100], right[1050:1200] = 0.0, np.nan  # a blink of each eye
     gaze = a_stream(looks, left_pupil_diameter=left, right_pupil_diameter=right)
-    body = Body(a_session(gaze, a_stream(beats, HR=heart), SimpleNamespace(header=None)))
+    body = BodySignals(a_session(gaze, a_stream(beats, HR=heart), SimpleNamespace(header=None)))
     found = body.measures(8.0, 20.0, [(12.0, 15.0)])
     own = [k for k in range(61) if 8 <= k <= 20 and not 12 <= k < 15]
     assert found["heart_rate"] == pytest.approx(np.mean([heart[k] for k in own]))
@@ -42,7 +42,10 @@ def test_heart_rate_and_pupil_are_means_from_onset_to_offset_without_blinks_and_
 def test_of_two_streams_none_is_chosen_and_a_time_without_samples_is_missing() -> None:
     beats = np.arange(0.0, 60.0)
     one = a_stream(beats, HeartRate=np.full(60, 70.0))
-    none = [Body(a_session(one, one)).measures(0.0, 9.0), Body(a_session()).measures(0.0, 9.0)]
-    none.append(Body(a_session(one)).measures(10.2, 10.8))
+    none = [
+        BodySignals(a_session(one, one)).measures(0.0, 9.0),
+        BodySignals(a_session()).measures(0.0, 9.0),
+    ]
+    none.append(BodySignals(a_session(one)).measures(10.2, 10.8))
     assert all(np.isnan([*each.values()]).all() for each in none)
-    assert Body(a_session(one)).measures(10.0, 11.0)["heart_rate"] == 70.0
+    assert BodySignals(a_session(one)).measures(10.0, 11.0)["heart_rate"] == 70.0

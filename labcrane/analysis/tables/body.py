@@ -14,7 +14,7 @@ HEART_RATE = frozenset({"hr", "heartrate", "bpm"})
 """Labels and types of a channel of beats per minute, as belts and watches send it."""
 
 
-class Body:
+class BodySignals:
     """The channels of a session that say how the body is.
 
     A measure is NaN where no stream has it, or several have: none is chosen silently.
