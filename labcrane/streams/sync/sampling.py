@@ -108,6 +108,9 @@ class Sampling:
         The period, where holes may be polls that were as fast as the sampler.
     shift_s
         By how much all samples may be shifted with no stamp on its grid of polls changed.
+    chunk_s
+        By how much the middle of a chunk may be beside the sample that its stamps rest on, which
+        may be the first or the last: the steps within a chunk are shorter than its samples take.
     back_s
         By how much the clock of an irregular stream without arrivals may have been set back.
     behind
@@ -140,6 +143,7 @@ class Sampling:
     kept_s: float = 0.0
     slip_s: float = 0.0
     shift_s: float = 0.0
+    chunk_s: float = 0.0
     behind: int = 0
 
     @property
@@ -245,6 +249,7 @@ def examine(
                 uncounted=blurred and level is None,
                 shift_s=receipt.open_shift(flowed, index),
                 breaks=found.breaks[: 0 if counter is None else None],
+                chunk_s=found.chunk_s,
             )
     noise, late, by_grid, uneven = _noise(time, arrival, found, grid)
     rates = _rates(found)
@@ -273,6 +278,7 @@ def examine(
         breaks=found.breaks,
         slip_s=found.period if found.slips else 0.0,
         shift_s=receipt.open_shift(found.flowed, found.index) if late else 0.0,
+        chunk_s=found.chunk_s,
     )
 
 
@@ -341,6 +347,7 @@ class _Steps:
     shifted: shifts.Shifts
     strayed: FloatArray | None
     slips: bool
+    chunk_s: float
 
 
 def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -> _Steps:
@@ -397,6 +404,7 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
         time, flowed, breaks + 1, mean, local, position, missing, int(gaps.sum()), longest, exact,
         computed, clumped, shifted, strayed,
         exact and not counted and hole.may_be_slips(len(steps)),
+        0.0 if exact else _half_a_chunk(steps / counts, typical),
     )  # fmt: skip
 
 
@@ -411,6 +419,20 @@ def _chunks(steps: FloatArray, usual: FloatArray) -> tuple[npt.NDArray[np.bool_]
     # A chunk that waits for longer than the one before comes late, the next one early.
     both_ways = (boundary < -EQUAL_S).mean() > EARLIER
     return same, bool(fraction.mean() > 0.5 and both_ways)  # noqa: PLR2004
+
+
+def _half_a_chunk(steps: FloatArray, typical: float) -> float:
+    """Return by how much half of a chunk is shorter, or longer, by its stamps than its samples.
+
+    Stamps of a chunk are computed from one of them, or all the same; what the steps within chunks
+    leave out, or have too much, is in the steps between them.
+    """
+    usual = float(np.median(steps))
+    between = steps[np.abs(steps - usual) > max(EQUAL_S, CLUMPED * (typical - usual))]
+    if not FEW <= len(between) < (1.0 - SAME) * len(steps):
+        return 0.0
+    size = len(steps) / len(between)
+    return (size - 1.0) / size * abs(float(np.median(between)) - usual) / 2.0
 
 
 def _typical(time: FloatArray, index: FloatArray) -> float:
