@@ -35,7 +35,6 @@ MODULES = {
     "score": ("score",),
     "results": ("export", "report", "replay", "view"),
     "simulate": ("simulate", "power", "tracks"),
-    "engines": ("compare_engines",),
     "approval": ("approve", "amend", "methods", "bundle"),
     "participants": (
         "participants", "study", "consent", "exclude", "note", "waive", "deviations",

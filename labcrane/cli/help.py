@@ -13,7 +13,7 @@ SECTIONS = {
         "language-server",
     ),
     "Run": ("demo", "run", "resume", "consent", "streams", "record"),
-    "Analyse": ("view", "report", "score", "export", "replay", "compare-engines"),
+    "Analyse": ("view", "report", "score", "export", "replay"),
     "Manage participants and data": (
         "study", "participants", "where", "note", "exclude", "waive", "deviations", "recover",
         "resync", "erase", "relabel", "transfer", "merge",

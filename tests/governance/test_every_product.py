@@ -211,7 +211,7 @@ IN_THE_DATA_FOLDER = {
 """They write recordings and the register, which is where erasing begins."""
 
 OF_NOBODY = {
-    "demo", "simulate", "tracks", "compare-engines", "doctor", "approve", "amend", "methods",
+    "demo", "simulate", "tracks", "doctor", "approve", "amend", "methods",
     "bundle", "report-problem", "schema", "new-study", "new-plugin", "streams", "record",
     "gateway can", "dmd fit", "dmd plot", "dmd record", "dmd validate",
 }  # fmt: skip
