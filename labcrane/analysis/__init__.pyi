@@ -19,7 +19,7 @@ from .gaze import Glass, fixations_of, glass_of, with_unseen_areas
 from .gaze_streams import gaze_space
 from .measures import measures_of
 from .monitor_settings import monitor_setting
-from .movements import Movement, events_of, movements_of
+from .movements import Movement, movements_of
 from .presented import PRESENTED, presentation_failed
 from .questionnaires import answers_of, asked_in, beside_trials, scores_of
 from .tables.annotations import annotations_of
@@ -45,7 +45,6 @@ __all__ = [
     "codebook_of",
     "eeg_streams",
     "events_at",
-    "events_of",
     "faults_of",
     "find_cohort",
     "fixations_of",

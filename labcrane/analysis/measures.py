@@ -13,10 +13,8 @@ from labcrane.analysis.gaze_streams import EYES, MEAN
 from labcrane.analysis.kinematics.halts import halts
 from labcrane.analysis.kinematics.smoothness import ldlj, low_pass, path_ratio, sparc, sub_movements
 from labcrane.analysis.movements import (
-    ANEW,
     Groups,
     Movement,
-    by_todays_rule,
     cut,
     machine_of,
     movements_of,
@@ -194,12 +192,10 @@ def measure_session(
     rate_hz = float(session.attrs["rate_hz"])
     seen = looks(session, settings.display_delay_s, settings.gaze_stream, settings.gaze_eye)
     body = BodySignals(session)
-    rows, recorded = [], []
+    rows = []
     errors: list[FloatArray] = []
-    for each in cut(frames, trials, rate_hz) if frames else movements_of(session):
-        movement = by_todays_rule(each, session)
+    for movement in cut(frames, trials, rate_hz) if frames else movements_of(session):
         row = measure(movement, machine, settings)
-        recorded.append(movement.row)
         errors.append(_errors(movement, settings))
         span = movement.span
         if seen is not None and span is not None:
@@ -218,10 +214,6 @@ def measure_session(
     measured["steering_entropy"] = [steering_entropy(each, usual) for each in errors]
     if seen is not None and seen.eyes:
         measured[GAZE_EYES] = seen.eyes
-    if measured["measured_anew"].any():
-        told = {name: [row.get(name, np.nan) for row in recorded] for name in ANEW}
-        there = {name: told[name] for name in ANEW if any(name in row for row in recorded)}
-        trials = trials.assign(**there)
     if (session.events["name"] == STIMULUS).any():
         trials = in_trials(trials, responses(session, settings.display_delay_s))
     shown = presented(session)
@@ -264,16 +256,14 @@ def measure(movement: Movement, machine: Machine, settings: MeasureSettings) -> 
         "constant_error": movement.result("error_along"),
         "absolute_error": movement.result("error"),
     }
-    how = {"measured_anew": float(movement.remeasured)}
     if set(OF_AIMING) <= movement.row.keys() and np.isnan(movement.result("movement_onset")):
-        return nothing | how  # where the machine stood is not a measure of accuracy
+        return nothing  # where the machine stood is not a measure of accuracy
     if span is None or span.stop - span.start < SHORTEST:
-        return nothing | how | errors
+        return nothing | errors
     speed, tip = movement.speed[span], movement.tip[span]
     smooth = low_pass(movement.tip, movement.rate_hz, settings.low_pass_hz)
     return {
         **errors,
-        **how,
         **_strokes(movement, span),
         "amplitude": _along(movement, tip),
         "path_ratio": path_ratio(smooth[span]),

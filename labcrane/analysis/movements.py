@@ -1,14 +1,14 @@
 """One movement's arrays, cut out of a session."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.analysis.kinematics.onset import ROUNDING_S, onset, reaction
+from labcrane.analysis.kinematics.halts import ROUNDING_S
 from labcrane.files.yaml import parse_yaml
 from labcrane.machines.machine import Machine
 from labcrane.recording.participant_file.reader import SessionRecord
@@ -52,9 +52,6 @@ class Movement:
         By name, ``left.x``; each of shape ``(n,)``, in [-1, 1].
     command, angles
         Joint speeds asked for in rad/s and joint angles in rad, shape ``(n, n_joints)``.
-    remeasured
-        Whether the recording used a former rule for onset and times, and ``row`` uses the present:
-        :func:`by_todays_rule`.
     """
 
     row: Mapping[str, Any]
@@ -66,7 +63,6 @@ class Movement:
     axes: Mapping[str, FloatArray]
     command: FloatArray
     angles: FloatArray
-    remeasured: bool = False
 
     @cached_property
     def speed(self) -> FloatArray:
@@ -78,9 +74,10 @@ class Movement:
     def span(self) -> slice | None:
         """The ticks from onset to offset, both included; None when one of them is missing.
 
-        For a task without errors, which has no aim, a movement begins with the reaction.
+        For a task without errors, which has no aim, a movement begins with the reaction; so do the
+        recordings of an aim before there was a ``movement_onset``.
         """
-        aimed = not np.isnan(self.result("error_along"))
+        aimed = not np.isnan(self.result("error_along")) and "movement_onset" in self.row
         onset = self.result("movement_onset" if aimed else "reaction_time")
         duration = self.result("movement_time")
         if np.isnan(onset) or np.isnan(duration):
@@ -134,8 +131,8 @@ def machine_of(session: SessionRecord) -> Machine:
 def movements_of(session: SessionRecord) -> Iterator[Movement]:
     """Yield the movement of each row of a session's trial table.
 
-    Aimed ones have their onset by today's rule (:func:`by_todays_rule`). However long the session,
-    so many ticks are in memory as the longest trial has, or :data:`TICKS`.
+    However long the session, so many ticks are in memory as the longest trial has, or
+    :data:`TICKS`.
     """
     trials, rate_hz = session.trials, float(session.attrs["rate_hz"])
     if trials.empty:  # of a session that ended before its first result, without columns
@@ -148,97 +145,8 @@ def movements_of(session: SessionRecord) -> Iterator[Movement]:
             after += 1
         # Trials in one piece of the file: each piece is unpacked but once or twice.
         frames = groups(session, begin, int(last[at:after].max()))
-        for movement in cut(frames, trials.iloc[at:after], rate_hz):
-            yield by_todays_rule(movement, session)
+        yield from cut(frames, trials.iloc[at:after], rate_hz)
         at = after
-
-
-DEFINES = ("movement_onset", "onset_speed", "onset_hold")
-"""Results of an aimed movement that a recording by a former rule has not."""
-
-ANEW = ("reaction_time", *DEFINES, "movement_time", "onset_to_rest", "path_length")
-"""Columns of the trial table that are by today's rule in :attr:`Movement.row`."""
-
-ONSET_SPEED, ONSET_HOLD_S = 0.02, 0.1
-"""In m/s and s: of an aimed movement whose recording does not say by what it was judged."""
-
-
-def by_todays_rule(movement: Movement, session: SessionRecord) -> Movement:
-    """Return an aimed movement with its onset, and what follows from it, by today's rule.
-
-    Until version 0.1 the onset was searched back from the peak of speed, by a share of it, and all
-    strokes before a halt were left out; ``reaction_time`` was the time to that onset. Those
-    recordings lack :data:`DEFINES`. The offset, the commands and the speed are as recorded.
-    """
-    row = movement.row
-    aimed = not np.isnan(movement.result("error_along"))
-    if not aimed or not np.isnan(movement.result("onset_speed")):
-        return movement
-    threshold, hold_s = _judged_by(session)
-    former = movement.result("reaction_time")
-    found = onset(
-        movement.elapsed,
-        movement.speed,
-        np.linalg.norm(movement.tip - movement.point("target"), axis=1),
-        threshold=threshold,
-        hold_s=hold_s,
-        nearer=movement.result("width") / 2.0,
-    )
-    # Without an onset by the former rule the recording does not say when the movement ended.
-    began = float(movement.elapsed[found]) if found is not None and not np.isnan(former) else np.nan
-    again = {
-        "reaction_time": reaction(movement.elapsed, movement.command),
-        "movement_onset": began,
-        "onset_speed": threshold,
-        "onset_hold": hold_s,
-        "movement_time": former + movement.result("movement_time") - began,
-    }
-    if "onset_to_rest" in row:
-        again["onset_to_rest"] = former + movement.result("onset_to_rest") - began
-    if "path_length" in row:
-        ended = former + movement.result("movement_time")
-        first = 0 if np.isnan(began) else found
-        last = None if np.isnan(ended) else np.searchsorted(movement.elapsed, ended - ROUNDING_S)
-        path = movement.tip[first : None if last is None else last + 1]
-        again["path_length"] = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
-    return replace(movement, row={**row, **again}, remeasured=True)
-
-
-def events_of(session: SessionRecord) -> "pd.DataFrame":
-    """Return a session's events, with the onsets of its counted movements by today's rule.
-
-    Of a recording by a former rule, ``movement.onset`` is at the former onset; here it is at
-    :func:`by_todays_rule`'s, and its data say so: ``measured_anew``. Other recordings' events are
-    as recorded.
-    """
-    events, trials = session.events, session.trials
-    if "error_along" not in trials or "onset_speed" in trials:
-        return events
-    onsets = (events["name"] == "movement.onset").to_numpy()
-    time, data = events["time"].to_numpy(np.float64).copy(), list(events["data"])
-    for movement in movements_of(session):
-        began = movement.result("movement_onset")
-        if not movement.remeasured or np.isnan(began):
-            continue
-        within = (time >= movement.due[0] - ROUNDING_S) & (time <= movement.due[-1] + ROUNDING_S)
-        for at in np.flatnonzero(onsets & within):
-            time[at] = movement.due[np.searchsorted(movement.elapsed, began - ROUNDING_S)]
-            data[at] = {**data[at], "measured_anew": True}
-    return events.assign(time=time, data=data)
-
-
-def _judged_by(session: SessionRecord) -> tuple[float, float]:
-    """Return by which speed and for how long it judged an onset, in m/s and s.
-
-    Of several tasks by the highest speed: it is above the noise of the machine for all of them.
-    """
-    settings = [part.get("settings", {}) for part in session.context.get("components", {}).values()]
-    told = [
-        (float(each["onset_speed"]), float(each["onset_hold_s"]))
-        for each in settings
-        if "onset_speed" in each and "onset_hold_s" in each
-    ]
-    return max(told, default=(ONSET_SPEED, ONSET_HOLD_S))
 
 
 def _ticks_of(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane.analysis import PRESENTED, events_of, glass_of, movements_of, presentation_failed
+from labcrane.analysis import PRESENTED, glass_of, presentation_failed
 from labcrane.core import name_of
 from labcrane.recording import (
     SessionRecord,
@@ -52,12 +52,10 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
     import pandas as pd
 
     zero = first_tick(session)
-    events = events_of(session).sort_values("time", kind="stable")
+    events = session.events.sort_values("time", kind="stable")
     told = list(zip(events["name"].astype(str), events["data"], strict=True))
     void, failed = void_attempts(told), presentation_failed(session)
-    ended = {attempt_of(data): _by_todays_rule(data) for name, data in told if name == END}
-    rows_of = (movement.row for movement in movements_of(session))
-    ended |= {attempt_of(row): row for row in rows_of}
+    ended = {attempt_of(data): data for name, data in told if name == END}
     rows = []
     begun: dict[object, dict[str, Any]] = {}
     for time, (name, data), label in zip(events["time"], told, labelled(told, failed), strict=True):
@@ -90,12 +88,6 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
     for name in WHOLE:
         table[name] = table[name].astype(float).astype("Int64")
     return table
-
-
-def _by_todays_rule(ended: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a trial's end without the reaction time that a former rule has given it."""
-    former = "error_along" in ended and "onset_speed" not in ended
-    return {**ended, "reaction_time": None} if former else ended
 
 
 def screen_of(session: SessionRecord) -> dict[str, Any]:

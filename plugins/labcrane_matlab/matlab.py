@@ -19,7 +19,6 @@ from labcrane.analysis import (
     answers_of,
     beside_trials,
     codebook_of,
-    events_of,
     measures_of,
     responses_of,
     scores_of,
@@ -90,7 +89,7 @@ class Matlab(Exporter):
         }
 
     def _session(self, number: int, session: SessionRecord) -> Value:
-        events = events_of(session).copy()
+        events = session.events.copy()
         events["data"] = [
             "{}" if name == "session.start" else json.dumps(data, ensure_ascii=False)
             for name, data in zip(events["name"], events["data"], strict=True)

@@ -16,7 +16,6 @@ from labcrane.analysis import (
     annotations_of,
     answers_of,
     beside_trials,
-    events_of,
     fixations_of,
     measures_of,
     presentation_failed,
@@ -241,7 +240,7 @@ def _person(participant: Participant) -> dict[str, object]:
 
 
 def _events(participant: Participant, number: int, session: SessionRecord) -> "pd.DataFrame":
-    told = events_of(session)
+    told = session.events
     events = told[["time", "tick", "part", "trial", "name", "data"]].copy()
     # The first event holds the whole context; it stays in the participant file.
     events["data"] = [

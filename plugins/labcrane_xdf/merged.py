@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane.analysis import Exporter, Participant, events_of, presentation_failed
+from labcrane.analysis import Exporter, Participant, presentation_failed
 from labcrane.core import name_of
 from labcrane.recording import (
     LABELS,
@@ -66,7 +66,7 @@ def write_session(writer: XdfWriter, session: SessionRecord) -> set[str]:
     rate_hz = float(session.attrs["rate_hz"])
     for name, stream in session.streams.items():
         _write_stream(writer, name, stream, rate_hz)
-    events = events_of(session).sort_values("time", kind="stable")
+    events = session.events.sort_values("time", kind="stable")
     told = list(zip(events["name"].astype(str), events["data"], strict=True))
     names = [name_of(name) for name, _ in told]
     # The first event holds the whole context; it stays in the participant file.

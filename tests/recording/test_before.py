@@ -22,8 +22,7 @@ import pyxdf
 
 import labcrane
 from labcrane.analysis.measures import measure_session
-from labcrane.analysis.movements import events_of
-from labcrane.analysis.tables.definitions import MEASURES
+from labcrane.analysis.movements import movements_of
 
 BEFORE = Path(__file__).parent / "before"
 NAME = "P001-SIMULATED"
@@ -204,37 +203,17 @@ def test_the_same_seed_makes_the_same_datasets(before: Path, now: Path) -> None:
         assert np.asarray(values).tobytes() == np.asarray(was).tobytes(), path
 
 
-def test_a_recording_of_before_is_measured_by_the_rule_of_today(before: Path, now: Path) -> None:
-    old, new = (labcrane.open_recording(each / f"{NAME}.h5").session(1) for each in (before, now))
-    was, found, today = measure_session(old), measure_session(new), new.trials
-    assert (was["measured_anew"] == 1.0).all()
-    assert (found["measured_anew"] == 0.0).all()
-    for name in {*BY_ANOTHER_RULE, "movement_onset", "onset_speed", "onset_hold"}:
-        np.testing.assert_allclose(was[name], today[name], rtol=1e-12, err_msg=name)
-        np.testing.assert_array_equal(found[name], today[name], err_msg=name)
-    for name in MEASURES.keys() - {"measured_anew"}:
-        np.testing.assert_allclose(was[name], found[name], rtol=1e-12, err_msg=name)
-    assert not np.allclose(old.trials["reaction_time"], today["reaction_time"])
-
-
-def test_onsets_of_before_are_told_where_they_are_by_the_rule_of_today(
-    before: Path, now: Path
-) -> None:
-    old, new = (labcrane.open_recording(each / f"{NAME}.h5").session(1) for each in (before, now))
-    of_old, of_new = events_of(old), events_of(new)
-    assert of_new is new.events
-    counted = old.trials["trial"].to_list()
-    found, expected = (
-        events[(events["name"] == ONSET) & events["trial"].isin(counted)]["time"].to_numpy()
-        for events in (of_old, of_new)
-    )
-    assert len(found) == len(counted)
-    np.testing.assert_allclose(found, expected, atol=1e-9)
-    anew = [data.get("measured_anew", False) for data in of_old["data"]]
-    moved = of_old["time"].to_numpy() != old.events["time"].to_numpy()
-    assert moved.any()
-    assert sum(anew) == len(counted)
-    assert not (moved & ~np.array(anew)).any()
+def test_a_recording_of_before_is_measured_from_the_onset_that_it_has(before: Path) -> None:
+    session = labcrane.open_recording(before / f"{NAME}.h5").session(1)
+    measured, trials = measure_session(session), session.trials
+    for name in BY_ANOTHER_RULE:
+        np.testing.assert_array_equal(measured[name], trials[name], err_msg=name)
+    for movement in movements_of(session):
+        assert movement.span is not None
+        began, last = (movement.elapsed[at] for at in (movement.span.start, movement.span.stop - 1))
+        assert began == pytest.approx(movement.result("reaction_time"), abs=1e-9)
+        assert last - began == pytest.approx(movement.result("movement_time"), abs=1e-9)
+    assert (measured["amplitude"] > 0.0).all()
 
 
 def test_every_dataset_of_before_reads_as_it_stands(before: Path) -> None:
@@ -307,4 +286,3 @@ def test_a_report_of_before_has_the_unit_of_everything_that_was_recorded_with_on
     recorded = {each: unit for each, unit in context["trial_units"].items() if each in measured}
     assert {"movement_time", "reaction_time", "error"} <= recorded.keys()
     assert table.loc[list(recorded), "unit"].to_dict() == recorded
-    assert table.loc["movement_onset", "unit"] == "s"  # measured anew

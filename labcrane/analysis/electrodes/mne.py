@@ -8,7 +8,6 @@ import numpy as np
 
 from labcrane.analysis.electrodes.sampled import Sampled, sampled
 from labcrane.analysis.monitor_settings import monitor_setting
-from labcrane.analysis.movements import events_of
 from labcrane.analysis.presented import presentation_failed
 from labcrane.errors import PluginError, RecordingError, nearest
 from labcrane.files.units import in_unit
@@ -160,7 +159,7 @@ def events_at(session: SessionRecord, signal: Sampled) -> tuple[Any, list[str]]:
 
     Those outside of the recording are left out.
     """
-    events = events_of(session).sort_values("time", kind="stable")
+    events = session.events.sort_values("time", kind="stable")
     told = list(zip(events["name"].astype(str), events["data"], strict=True))
     positions = signal.at(events["time"].to_numpy(np.float64))
     inside = np.isfinite(positions)

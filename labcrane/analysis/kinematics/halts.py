@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labcrane.analysis.kinematics.onset import ROUNDING_S
 from labcrane.types import FloatArray
+
+ROUNDING_S = 1e-9
+"""Elapsed times are sums of whole ticks."""
 
 
 @dataclass(frozen=True, slots=True)

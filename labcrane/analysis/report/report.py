@@ -146,7 +146,10 @@ def write_report(
     page.heading("Definitions")
     words = "; ".join(f"{name} {_setting(value)}" for name, value in settings.as_dict().items())
     page.say(f"Settings of the measures: {words}.")
-    page.say(_by_which_rule(everything))
+    page.say(
+        "A movement begins when the tip is first faster than onset_speed for onset_hold, columns "
+        "of the movements, and its halts are part of it; reaction_time is that of the sticks."
+    )
     page.table("definitions", defined)
     everything.to_csv(folder / "tables" / "movements.csv", index=False)
     return page.write()
@@ -611,23 +614,6 @@ def _syncs(page: Page, tables: PersonTables) -> None:
         "screen, sensor and device together, and a stream whose delay grows by more than is stated "
         "fails.",
         "Loop-back checks",
-    )
-
-
-def _by_which_rule(everything: "pd.DataFrame") -> str:
-    """Return the definition of onset, and the number of recordings with another rule."""
-    rule = (
-        "A movement begins when the tip is first faster than onset_speed for onset_hold, columns "
-        "of the movements, and its halts are part of it; reaction_time is that of the sticks."
-    )
-    again = int((everything["measured_anew"] == 1.0).sum()) if "measured_anew" in everything else 0
-    if not again:
-        return rule
-    return (
-        f"{rule} {again} of {len(everything)} movements were recorded by a former rule, from the "
-        "onset of the fastest stroke, with reaction_time up to it: their reaction_time, "
-        "movement_onset, movement_time, onset_to_rest and path_length were computed again, and are "
-        "not those of the recording."
     )
 
 

@@ -15,11 +15,6 @@ MEASURES: Mapping[str, tuple[str, str]] = {
         "not absolute_error_along_m of the report, which is along the task axis only; NaN where "
         "nothing moved",
     ),
-    "measured_anew": (
-        "1",
-        "1 where the recording used a former rule for onset and times, and the present rule is "
-        "used here",
-    ),
     "halts": (
         "1",
         "stretches between onset and offset in which the tip is not faster than onset_speed for "
