@@ -15,14 +15,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from gate import GATE, PASSED, QUICK, Gate, leave_out_passed
 from hypothesis import HealthCheck, settings
 from leavings import watch
 from left_out import leave_out, look_again, nothing_to_find
 from needs import need, not_tried
 from once import RUN_FOLDER
-from parts import NAME, Parts, add_options, asked_for
 from port_block import claim
-from second_try import GATE, PASSED, QUICK, SecondTry, leave_out_passed
 
 from labcrane.streams.network import LOOPBACK
 
@@ -69,20 +68,14 @@ LONG_S = 1800
 """How long a test marked ``long`` may take, in s: busy computers need a multiple of the minutes."""
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    add_options(parser)
-
-
 def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):
         os.environ[RUN_FOLDER] = str(_FOLDER)
         if sys.platform != "win32":
             watch()
-    if asked_for(config):
-        config.pluginmanager.register(Parts(config), NAME)
     if GATE in os.environ and not hasattr(config, "workerinput"):
         passed = Path(os.environ[PASSED]) if PASSED in os.environ else None
-        config.pluginmanager.register(SecondTry(config, Path(os.environ.pop(GATE)), passed))
+        config.pluginmanager.register(Gate(config, Path(os.environ.pop(GATE)), passed))
 
 
 @pytest.hookimpl(optionalhook=True)  # pytest -p no:xdist

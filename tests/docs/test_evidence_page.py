@@ -21,7 +21,7 @@ NOTHING: dict[str, Any] = {
 }
 RUN = {
     "status": 0, "system": "Linux", "python": "3.14.1", "what": "quick tests", "passed": 7,
-    "failed": 0, "skipped": 2, "second_try": [], "processor_s": 5,
+    "failed": 0, "skipped": 2, "processor_s": 5,
 }  # fmt: skip
 
 
@@ -131,29 +131,6 @@ def test_a_stage_in_which_no_test_passed_is_not_passed(
     record = after(tmp_path, stage, *runs)
     assert record["stages"][stage]["ended"] == "not tried: no test ran"
     assert {run["ended"] for run in record["systems"]} <= {"not tried: no test ran"}
-
-
-def part(before: int, passed: int, *commits: str, of: int = 9) -> dict[str, Any]:
-    return {"before": before, "passed": passed, "no_time": 1, "of": of, "commits": list(commits)}
-
-
-@pytest.mark.parametrize(
-    ("parts", "ending", "ended"),
-    [
-        (part(0, 7, "a"), "passed", "passed in part: 7 of 9, of a"),
-        (part(3, 7, "a", "b", "c"), "passed", "passed in part: 7 of 9, of commits a to c"),
-        (part(3, 9, "a", "b"), "passed", "passed: 9 of 9, of commits a to b"),
-        (part(3, 7, "a", "b"), "failed", "failed: 7 of 9, of commits a to b"),
-        (part(0, 0), "failed", "failed: 0 of 9"),
-    ],
-)
-def test_a_run_in_parts_says_how_much_has_passed_and_of_which_commits(
-    tmp_path: Path, parts: dict[str, Any], ending: str, ended: str
-) -> None:
-    run = RUN | {"passed": parts["passed"], "status": int(ending == "failed"), "parts": parts}
-    record = after(tmp_path, "soak", run, ending=ending)
-    assert record["stages"]["soak"]["ended"] == ended
-    assert [one["ended"] for one in record["systems"]] == [ended]
 
 
 def test_no_row_of_the_record_has_passed_without_a_test() -> None:

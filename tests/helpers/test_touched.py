@@ -21,7 +21,7 @@ PROGRAM = gate_program("touched")
         ("labcrane/monitoring/process.py", "tests/streams/test_monitoring.py"),
         ("labcrane/errors.py", "tests"),
         ("plugins/labcrane_view/camera.py", "tests/plugins/test_view_whole.py"),
-        ("tests/helpers/second_try.py", "tests/helpers/test_second_try.py"),
+        ("tests/helpers/gate.py", "tests/helpers/test_gate.py"),
         ("tests/helpers/once.py", "tests/governance"),
         ("tests/faults/witness.py", "tests/faults"),
         ("tests/recording/former/none/P001.h5", "tests/recording"),
