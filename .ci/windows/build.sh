@@ -4,7 +4,8 @@
 # FOLDER/python then runs in any folder what `python` would on Windows. It needs Debian's wine, wine64
 # and gcc-mingw-w64-x86-64, and a Python 3.11 with venv; all else comes as wheels. No index of packages
 # has an installer of Python for Windows, but Panda3D's wheel has the part of it that is compiled, for the
-# programs that are made with it; the other part is the same on all systems.
+# programs that are made with it; the other part is the same on all systems. Stand-ins on Linux alone would show only what
+# was expected; Wine does not show timing, consoles, sound, graphics or access lists.
 set -euo pipefail
 here=$(realpath "$(dirname "$0")")
 project=$(realpath "$here/../..")

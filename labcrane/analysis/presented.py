@@ -2,6 +2,9 @@
 
 A view records when each picture was shown (``labcrane.feedback.NAME``), and the session when a view
 or sound failed and was back. Status light, sync report and results use :class:`PresentedLimits`.
+
+Such a movement is left out of means. A mean rate over the movement would hide slow seconds; from
+the onset on, an invisible target would be a slow reaction; analyses would ignore a warning.
 """
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence

@@ -1,4 +1,9 @@
-"""Environment of a study: the installed packages, by version and by the installer's record."""
+"""Environment of a study: the installed packages, by version and by the installer's record.
+
+Another NumPy may give other numbers, unnoticed. Hashing all files would take seconds before each
+session, so only those of labcrane and plugins are. The materials have a hash of their own, which is
+the same on every computer.
+"""
 
 import csv
 import hashlib

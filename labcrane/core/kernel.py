@@ -8,6 +8,10 @@ bits, which ``labcrane.testing`` checks tick by tick.
 A kernel computes only ticks without any event for Python. In all others, as when a plan is made, an
 event is reported or a trial ends, it declines, and the component itself computes that tick: so a
 kernel is the small part of a component that takes the time, not a second implementation of it.
+
+Kernels use no ``math.hypot``, ``math.dist`` or ``sum`` of floats, which Python 3.12 rounds
+differently. A C extension would need a compiler, or wheels for every system, from plugin authors
+too. Numba loads slowly, so sessions with people do without it.
 """
 
 from __future__ import annotations

@@ -87,7 +87,7 @@ InputAxis = Annotated[
 
 ButtonName = Annotated[str, Reference("button")]
 """A button: an axis of the input that is pressed or not, and has no sign: ``right.trigger``. For an
-input that does not state which of its axes are buttons, any axis."""
+input that does not state which of its axes are buttons, any axis: names do not tell."""
 
 JointName = Annotated[str, Reference("joint")]
 """A joint of the machine."""

@@ -154,7 +154,8 @@ class Task(Component):
 
     reports: tuple[str, ...] = ()
     """Observations that people can report by a button of either page while its trial runs:
-    ``("deformity",)``. A report is the event ``order.report``, with the observation as ``text``."""
+    ``("deformity",)``. A report is the event ``order.report``, with the observation as ``text``:
+    the participant's own words could bring names into the record."""
 
     @abstractmethod
     def factors(self) -> Mapping[str, Sequence[str]]:

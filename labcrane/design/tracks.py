@@ -2,6 +2,9 @@
 
 A track keeps no state of its own. Its next level is computed from the responses in the record,
 by the same function in a session, after a kill, in the next session, and in a replay.
+
+QUEST+ is our own: the library is unmaintained and too slow for a tick, and tests compare every
+choice with it.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

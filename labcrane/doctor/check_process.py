@@ -2,6 +2,9 @@
 
 If a server's folder does not answer, a driver hangs, or a library crashes its process, the doctor
 reports what did so, and where, and continues.
+
+In a thread, code that hangs in C would keep the interpreter; in one process for all, the first hang
+would hide the rest.
 """
 
 import faulthandler

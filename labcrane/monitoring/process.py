@@ -5,6 +5,9 @@
 On its standard input come messages: a line of JSON, and for samples their times and values as
 little-endian doubles behind it. It answers each with a line of JSON: what has changed. It ends with
 its input. A monitor that hangs or crashes takes this process with it, and nothing else.
+
+Nothing pauses because of a fault: detection may be wrong, and analysis decides. Threads in the
+recorder would end it when they crash in C; inlets of their own would get other samples.
 """
 
 import json

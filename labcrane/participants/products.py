@@ -3,6 +3,9 @@
 Their writer, a command or a plugin, receives the folder for them, so that no file is missed: all
 files in it at the end are known by name. A kill in the middle leaves a folder that the register
 lists as unfinished.
+
+A file that is not known to be one person's belongs to everybody, and goes with the first who is
+erased: a plugin without declarations loses files and keeps the promise.
 """
 
 import fnmatch

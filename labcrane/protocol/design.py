@@ -141,7 +141,8 @@ class Design(Settings):
     primary: tuple[str, ...] = ()
     """Primary outcomes of the study: results of its tasks or measures of a
     movement, ``[circle_to_circle, absolute_error]``. Their trends share one correction for several
-    tests; where none are named, all outcomes that the report tests share it."""
+    tests; where none are named, all outcomes that the report tests share it. They are named here
+    and not to ``labcrane report``: one that is chosen after data collection is not primary."""
 
     @field_validator("conditions")
     @classmethod

@@ -4,6 +4,8 @@
 relabelled with the recordings, and stays when the participant file is rebuilt from its journals.
 The recording itself is never changed. No line is ever removed from the file: withdrawing an
 annotation adds a line that says so.
+
+A group in the participant file would be lost when the file is made again.
 """
 
 import json

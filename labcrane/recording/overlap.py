@@ -3,6 +3,9 @@
 LSL sends every receiver the samples of a stream in one order, from when it connects until it dies.
 So what two recorders have are two subsequences of one sequence. A sample is known again by its
 stamp and its values, to the bit; where these repeat, by its neighbours.
+
+Two write because a spare that had yet to connect lost samples. A ring in shared memory would lose
+those that come while no recorder is connected.
 """
 
 import bisect

@@ -1,4 +1,8 @@
-"""Registry of installed plugins and of what they offer."""
+"""Registry of installed plugins and of what they offer.
+
+A plugin that fails in any way is kept with its reason, which is reported where the plugin was
+needed; the others go on. Two that offer one name are an error for both.
+"""
 
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path

@@ -291,7 +291,8 @@ class Sequencer:
         """Give the experimenter time to judge the test that has ended, unless it was judged.
 
         A judgement does not end the wait: a slip can be mended, and an end be overridden too.
-        There was time already where something was ``asked`` after the test.
+        There was time already where something was ``asked`` after the test. A fixed number of
+        seconds would be too long for one experimenter and too short for another.
         """
         about = self._ledger.unjudged
         if asked or not (self._waits and about) or self._held.ending:

@@ -1,7 +1,7 @@
 """Standing of a session: what runs, who holds it, and which orders make sense now.
 
 It follows from the session's events alone, so that the sequencer, every page and every terminal
-that hear them have the same, and one rule says what can be ordered.
+that hear them have the same, and one rule says what can be ordered: two rules had drifted apart.
 """
 
 from collections.abc import Mapping

@@ -4,6 +4,9 @@ It finds before a session what only running finds: the study's own plugins are b
 called as in a session, in its order, on a clock that does not wait. All other trials of the planned
 participants are begun and not run: a scene is placed by the seed of its trial, and can fit for most
 of them.
+
+Its load of the loop is processor time: wall time warned about good studies on busy computers.
+Hidden views would need graphics on an office computer.
 """
 
 import tempfile

@@ -34,8 +34,9 @@ class BulletCrane(Crane):
     """Velocity motors that hold against gravity up to each joint's effort.
 
     In an ordinary tick the torques that give the speeds asked for are worked out, and no solver is
-    needed (docs/decisions/0090-torques-before-passes.md). When one of them is more than its motor
-    has, or a joint is beyond its limit, the engine's motors and its solver find out what happens.
+    needed. When one of them is more than its motor has, or a joint is beyond its limit, the
+    engine's motors and its solver find out what happens. Without gravity, motors could follow other
+    commands.
 
     Every reset restarts the engine: setting joints by hand leaves contact and solver caches behind,
     and the same commands would then not give the same bits.

@@ -1,4 +1,8 @@
-"""Episodes of a recording: one per counted attempt, as pairs of observation and action."""
+"""Episodes of a recording: one per counted attempt, as pairs of observation and action.
+
+A row has the state of one tick and the axes of the next: a policy trained on frames would learn to
+read axes from their consequence.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -17,10 +17,9 @@ from labcrane_mujoco.limited_drives import limited_torques
 class MujocoCrane(Crane):
     """Drives that give each joint its speed at the end of the tick, up to its effort.
 
-    The engine's mass matrix and bias forces say which torques that takes, as in
-    docs/decisions/0090-torques-before-passes.md. Where a drive has not the torque, those of all
-    joints are solved for together, so that only its own joint and what hangs on it are slower. The
-    engine's own velocity servos cannot hold a crane at 240 Hz.
+    The engine's mass matrix and bias forces say which torques that takes. Where a drive has not the
+    torque, those of all joints are solved for together, so that only its own joint and what hangs
+    on it are slower. The engine's own velocity servos cannot hold a crane at 240 Hz.
 
     No joint is asked to go beyond its limit. One that its drive cannot stop in time is stopped by
     an end stop of ours: the engine's own limits are soft, and let a joint through by 0.3 degrees.

@@ -1,4 +1,8 @@
-"""The main stroke of every recorded movement, to which the operator's model is fitted."""
+"""The main stroke of every recorded movement, to which the operator's model is fitted.
+
+A movement's time has reaction, looks and corrections in it, and the end rule cuts off errors: so
+the part around the largest speed is fitted.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -18,6 +18,8 @@ A comment on the line above a block says what else is to be known of it:
     <!-- not run: REASON -->  it cannot be run in a test, and why
 
 A block without a language lists files that are there.
+
+External links are only listed: other sites must not fail our tests.
 """
 
 import json

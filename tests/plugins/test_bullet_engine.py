@@ -283,7 +283,7 @@ def test_torques_worked_out_before_the_step_change_its_time_only(
 def test_a_simulated_operator_who_aims_asks_no_motor_for_too_much(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every tick that did would cost the solver's time (docs/decisions/0108)."""
+    """Every tick that did would cost the solver's time."""
     from labcrane_bullet.bullet_crane import BulletCrane
 
     work_out, enough = BulletCrane._enough, []

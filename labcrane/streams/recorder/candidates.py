@@ -2,6 +2,9 @@
 
 A neighbour's amplifier is of the same type as one's own. So nothing of a candidate is recorded: its
 people were not asked, and who looks at the recording could not tell it from the right one.
+
+A confirmation holds for one session: remembered on a computer, a protocol would mean something else
+on each one.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,7 @@
-"""Every segment of the simulated arm, driven through the engine's steps as the real one was."""
+"""Every segment of the simulated arm, driven through the engine's steps as the real one was.
+
+One segment at a time, which is how it was recorded.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,8 @@
-"""Backdrop of a camera that stands still: the scenery drawn once, and shown below what moves."""
+"""Backdrop of a camera that stands still: the scenery drawn once, and shown below what moves.
+
+Once with sun, once without, and its depth: colour is linear in sunlight, so that both mixed by the
+shadows of what moves equal a full drawing. Baked shadows would be wrong on trees.
+"""
 
 from typing import Any
 

@@ -1,4 +1,8 @@
-"""Window, or a picture without a window, with any available renderer."""
+"""Window, or a picture without a window, with any available renderer.
+
+One window covers all monitors, as two processes would show different frames. When its monitor is
+lost it keeps its size, so that pixels keep their meaning.
+"""
 
 import os
 from collections.abc import Sequence
