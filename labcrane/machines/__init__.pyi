@@ -1,7 +1,7 @@
 """The public names of this package, and the modules from which they are imported."""
 
 from . import directions
-from .actuator import ACTUATOR_PRESETS, Actuator, ActuatorSettings
+from .actuator import ACTUATOR_PRESETS, ActuatorSettings
 from .inverse_kinematics import reach
 from .jointed_body import Hinge, Segment, beside, segments, stands
 from .kinematics import Arm, jacobian, link_frames
@@ -22,7 +22,6 @@ __all__ = [
     "ACTUATOR_PRESETS",
     "GRAVITY",
     "SCENE_PLACED",
-    "Actuator",
     "ActuatorSettings",
     "Arm",
     "Body",

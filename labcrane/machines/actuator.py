@@ -1,8 +1,6 @@
-"""Actuator model between commanded and joint speed: dead time, lag and a rate limit."""
+"""Settings of actuators: dead time, lag and a rate limit between commanded and joint speed."""
 
-import math
-from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from pydantic import (
@@ -62,68 +60,3 @@ ACTUATOR_PRESETS: dict[str, ActuatorSettings] = {
     "sluggish": ActuatorSettings(dead_time_s=0.2, lag_s=0.4, rate_limit=2.0),
 }
 """Named delays. The figures are ours: orders of magnitude of such drives, not measurements."""
-
-
-class Actuator:
-    """Dead time, then lag, then rate limit, for each joint.
-
-    A command holds over its tick, and so does the speed that comes of it. The lag is discretised
-    exactly for that: at the end of a tick the speed has moved towards the delayed command by
-    ``1 - exp(-dt / lag)`` of the distance, which is the step response at that moment.
-
-    Parameters
-    ----------
-    settings
-        The delays.
-    speeds
-        Full joint speeds in rad/s, which the rate limit is a fraction of.
-    dt
-        Length of a tick, in seconds.
-    """
-
-    def __init__(self, settings: ActuatorSettings, speeds: Sequence[float], dt: float) -> None:
-        self.ideal = settings == ACTUATOR_PRESETS["ideal"]
-        self._still = (0.0,) * len(speeds)
-        self._delay = round(settings.dead_time_s / dt)
-        self._share = 1.0 - math.exp(-dt / settings.lag_s) if settings.lag_s else 1.0
-        limit = math.inf if settings.rate_limit is None else settings.rate_limit
-        self._most = tuple(limit * speed * dt for speed in speeds)
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget every command: the joints are at rest."""
-        self._speeds = list(self._still)
-        self._waiting = deque([self._still] * self._delay)
-
-    @property
-    def delay(self) -> int:
-        """Ticks before a command has any effect."""
-        return self._delay
-
-    @property
-    def constants(self) -> tuple[float, ...]:
-        """Whether it is ideal, the lag's share of a tick, each joint's largest change in rad/s."""
-        return (float(self.ideal), self._share, *self._most)
-
-    def numbers(self) -> list[float]:
-        """Return the state for a compiled kernel: speeds, then delayed commands, in rad/s."""
-        return [*self._speeds, *(speed for command in self._waiting for speed in command)]
-
-    def go_on(self, numbers: Sequence[float]) -> None:
-        """Take over the state of a compiled kernel: :attr:`numbers`, in rad/s."""
-        joints = len(self._speeds)
-        self._speeds = list(numbers[:joints])
-        rows = range(joints, joints * (1 + self._delay), joints)
-        self._waiting = deque(tuple(numbers[at : at + joints]) for at in rows)
-
-    def follow(self, command: Sequence[float]) -> Sequence[float]:
-        """Return the joint speeds in rad/s that a tick with this command leads to."""
-        if self.ideal:
-            return command
-        self._waiting.append(tuple(command))
-        speeds = self._speeds
-        for joint, goal in enumerate(self._waiting.popleft()):
-            change = self._share * (goal - speeds[joint])
-            most = self._most[joint]
-            speeds[joint] += most if change > most else -most if change < -most else change
-        return tuple(speeds)

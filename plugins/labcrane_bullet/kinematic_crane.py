@@ -22,11 +22,4 @@ class KinematicCrane(Crane):
         self._angles = list(angles)
 
     def _move(self, speeds: Sequence[float]) -> FloatArray:
-        moved, angles = list(speeds), self._angles
-        for joint, (lowest, highest) in enumerate(self._machine.limits):
-            angle = angles[joint] + moved[joint] * self._dt
-            if not lowest <= angle <= highest:
-                angle = lowest if angle < lowest else highest
-                moved[joint] = 0.0
-            angles[joint] = angle
-        return self._state.fill(angles, moved)
+        return self._turn(self._angles, list(speeds))

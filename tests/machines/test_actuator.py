@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from pydantic import BaseModel, ValidationError
 
-from labcrane.machines import ACTUATOR_PRESETS, Actuator, ActuatorSettings
+from labcrane.core.cranes.actuator import Actuator
+from labcrane.machines import ACTUATOR_PRESETS, ActuatorSettings
 from labcrane.testing import RATE_HZ
 
 FULL = (0.5, 0.25)

@@ -8,6 +8,7 @@ import numpy as np
 
 from labcrane.core import compiled
 from labcrane.core.cranes import law
+from labcrane.core.cranes.actuator import Actuator
 from labcrane.core.cranes.crane_settings import CraneSettings
 from labcrane.core.cranes.crane_state import CraneState
 from labcrane.core.kernel import STATE, Kernel, Places
@@ -15,7 +16,6 @@ from labcrane.core.records import Frame, Run, Value
 from labcrane.core.roles import Dynamics
 from labcrane.core.signals import Signal
 from labcrane.errors import PluginError, ProtocolError
-from labcrane.machines.actuator import Actuator
 from labcrane.machines.links import link_boxes
 from labcrane.machines.machine import Body, Machine
 from labcrane.types import FloatArray
@@ -87,6 +87,7 @@ class Crane(Dynamics):
             )
         self._dt = 1.0 / run.rate_hz
         self._actuator = Actuator(self._settings.actuator, self._machine.speeds, self._dt)
+        self._lowest, self._highest = zip(*self._machine.limits, strict=True)
         self.reset(self._machine.rest)
 
     def state(self) -> FloatArray:
@@ -140,15 +141,15 @@ class Crane(Dynamics):
         speeds, the actuator's speeds and pending commands, which it keeps up to date.
         """
         joints, actuator = self._machine.joints, self._actuator
-        ideal, share, *most = actuator.constants
         head = (
             len(joints), actuator.delay, self._dt, self._machine.base_x, joints[0].d,
-            self._drive.start, 10 + 5 * len(joints) + len(further), ideal, share, 0.0,
+            self._drive.start, 10 + 5 * len(joints) + len(further), float(actuator.ideal),
+            actuator.share, 0.0,
         )  # fmt: skip
-        low, high = zip(*self._machine.limits, strict=True)
         lengths, offsets = zip(*((joint.a, joint.offset) for joint in joints), strict=True)
         moving = [0.0] * (len(joints) * (3 + actuator.delay))
-        own = np.array([*head, *most, *low, *high, *lengths, *offsets, *further, *moving])
+        tables = (*actuator.most, *self._lowest, *self._highest, *lengths, *offsets)
+        own = np.array([*head, *tables, *further, *moving])
         return Kernel(
             compiled.tick(step),
             own,
@@ -160,12 +161,12 @@ class Crane(Dynamics):
 
     def _take_over(self, own: FloatArray, seen: Frame) -> bool:
         angles, speeds = self._motion()
-        own[int(own[6]) :] = [*angles, *speeds, *self._actuator.numbers()]
+        own[int(own[6]) :] = [*angles, *speeds, *self._actuator.numbers]
         return True
 
     def _hand_back(self, own: FloatArray, rows: FloatArray, places: Places) -> None:
         joints, at = len(self._machine.joints), int(own[6])
-        self._actuator.go_on(own[at + 2 * joints :].tolist())
+        self._actuator.numbers = own[at + 2 * joints :].tolist()
         values = self._state.values
         values[:] = rows[-1, places[STATE] : places[STATE] + len(values)]
         self._stand(values[:joints].tolist(), values[joints : 2 * joints].tolist())
@@ -177,6 +178,11 @@ class Crane(Dynamics):
 
     def _stand(self, angles: Sequence[float], speeds: Sequence[float]) -> None:
         """Continue from ``angles`` in rad and ``speeds`` in rad/s, the end of a kernel's ticks."""
+
+    def _turn(self, angles: list[float], speeds: list[float]) -> FloatArray:
+        """Turn all joints at their speeds, each within its range; return the filled state."""
+        law.turn(angles, speeds, self._lowest, self._highest, self._dt)
+        return self._state.fill(angles, speeds)
 
     @abstractmethod
     def _place(self, angles: Sequence[float]) -> None:

@@ -16,6 +16,7 @@ from labcrane.machines.machine import GRAVITY, Machine
 from labcrane.types import FloatArray
 
 Numbers = Sequence[float] | FloatArray
+MutableNumbers = list[float] | FloatArray
 
 JOINTS, DELAY, DT, BASE_X, HEIGHT, DRIVE, CHANGES, IDEAL, SHARE = range(9)
 """Joints, ticks of dead time, length of a tick, the foot, the first command and where what changes
@@ -25,24 +26,38 @@ TABLES = 10
 comes behind them: angles, speeds, the actuator's speeds and commands on their way."""
 
 
+def lag(moving: MutableNumbers, command: Numbers, delay: int, share: float, most: Numbers) -> None:
+    """Change an actuator's speeds, and behind them the commands on their way, by a command."""
+    n = len(command)
+    for j in range(n):
+        change = share * ((moving[n + j] if delay > 0 else command[j]) - moving[j])
+        moving[j] += most[j] if change > most[j] else (-most[j] if change < -most[j] else change)
+    if delay > 0:
+        moving[n : n * delay] = moving[2 * n :]
+        moving[n * delay :] = command
+
+
 def follow(own: FloatArray, at: int, command: FloatArray, speeds: FloatArray) -> None:
     """Fill the speeds that come of a command."""
-    n, delay = len(speeds), int(own[DELAY])
+    n = len(speeds)
     if own[IDEAL] != 0.0:
         speeds[:] = command
         return
-    lagging, waiting = at + 2 * n, at + 3 * n
-    for j in range(n):
-        goal = own[waiting + j] if delay > 0 else command[j]
-        change = own[SHARE] * (goal - own[lagging + j])
-        most = own[TABLES + j]
-        own[lagging + j] += most if change > most else (-most if change < -most else change)
-        speeds[j] = own[lagging + j]
-    if delay > 0:
-        for k in range(waiting, waiting + n * (delay - 1)):
-            own[k] = own[k + n]
-        last = waiting + n * (delay - 1)
-        own[last : last + n] = command
+    moving = own[at + 2 * n :]
+    lag(moving, command, int(own[DELAY]), own[SHARE], own[TABLES : TABLES + n])
+    speeds[:] = moving[:n]
+
+
+def turn(
+    angles: MutableNumbers, speeds: MutableNumbers, lowest: Numbers, highest: Numbers, dt: float
+) -> None:
+    """Turn joints for a tick; one that comes to an end of its range stops there."""
+    for j in range(len(speeds)):
+        angle = angles[j] + speeds[j] * dt
+        if not lowest[j] <= angle <= highest[j]:
+            angle = lowest[j] if angle < lowest[j] else highest[j]
+            speeds[j] = 0.0
+        angles[j] = angle
 
 
 def tip_motion(
@@ -102,12 +117,8 @@ def step(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> 
     angles, speeds = row[state : state + n], row[state + n : state + 2 * n]
     follow(own, at, row[drive : drive + n], speeds)
     low, high = TABLES + n, TABLES + 2 * n
-    for j in range(n):
-        angle = own[at + j] + speeds[j] * dt
-        if not own[low + j] <= angle <= own[high + j]:
-            angle = own[low + j] if angle < own[low + j] else own[high + j]
-            speeds[j] = 0.0
-        own[at + j] = angles[j] = angle
+    turn(own[at : at + n], speeds, own[low:high], own[high : high + n], dt)
+    angles[:] = own[at : at + n]
     put_tip(own, angles, speeds, row[state + 2 * n : state + 2 * n + 6])
     return kernel.MADE
 
