@@ -89,6 +89,28 @@ def test_everything_known_of_a_stream_is_in_the_participant_file(folder: Path) -
         assert json.loads(group["notes/data"].asstr()[0])["event"] == "reset"
 
 
+def test_nanoseconds_of_an_int64_stream_keep_every_bit(folder: Path) -> None:
+    """They became float64, and lost their last 8 bits."""
+    header = StreamHeader(
+        "Clocks", "Clocks", (Channel("ns", "ns"), Channel("count", "1")), "int64", 0.0, "card"
+    )
+    rows = np.array([[1_700_000_000_123_456_789, 3], [-9_007_199_254_740_993, -4]])
+    with XdfWriter(folder / "ses-01_streams.part2.xdf") as writer:
+        writer.write_samples(writer.add_stream(header), np.array([1.0, 2.0]), rows)
+    assert recover(folder)[0].done is not None
+    stream = open_recording(folder / "P001.h5").session(1).streams["Clocks"]
+    assert stream.column("ns").tolist() == rows[:, 0].tolist()
+    assert stream.numeric == ["ns", "count"]
+    with h5py.File(folder / "P001.h5") as file:
+        kinds = {name: each.dtype for name, each in file["ses-01/streams/Clocks/data"].items()}
+    assert kinds == {"ns": np.int64, "count": np.float64}
+    # Reading back, as a correction does, and writing again changes nothing.
+    recorrect(folder / "P001.h5", as_they_are)
+    again = open_recording(folder / "P001.h5").session(1).streams["Clocks"]
+    assert again.column("ns").tolist() == rows[:, 0].tolist()
+    assert again.data["count"].tolist() == [3.0, -4.0]
+
+
 def test_parts_of_a_stream_are_joined_where_its_source_is_the_same(folder: Path) -> None:
     record(folder / "ses-01_streams.part2.xdf", 500, first=2000)
     seen: dict[str, RecordedStream] = {}

@@ -1,7 +1,8 @@
 """Columns in HDF5 that R, MATLAB and Octave read alike.
 
 Numbers are one-dimensional float64 columns, everything else is UTF-8 text. No int64 (R turns it
-into NA), no truth values, no compound types, no variable-length arrays but texts.
+into NA) but for channels of streams that float64 would round, no truth values, no compound types,
+no variable-length arrays but texts.
 """
 
 import json
@@ -10,8 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-
-from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import h5py
@@ -29,9 +28,11 @@ ATTRIBUTE_BYTES = 60_000
 """HDF5 refuses attributes beyond 64 kB."""
 
 
-def write_numbers(group: "h5py.Group", path: str, values: FloatArray, unit: str) -> None:
-    """Write one column of numbers with its unit."""
-    values = np.ascontiguousarray(values, np.float64)
+def write_numbers(
+    group: "h5py.Group", path: str, values: npt.NDArray[Any], unit: str, *, whole: bool = False
+) -> None:
+    """Write one column of numbers with its unit; ``whole`` ones are kept as int64."""
+    values = np.ascontiguousarray(values, np.int64 if whole else np.float64)
     if len(values) < COMPRESS_FROM:
         dataset = group.create_dataset(path, data=values)
     else:

@@ -104,6 +104,6 @@ def _own_clock(group: "h5py.Group") -> FloatArray:
 def read_channel(group: "h5py.Group", label: str) -> FloatArray | None:
     """Return one channel of numbers of a stream, by its label, shape ``(n,)``; None without it."""
     for dataset in group["data"].values():
-        if str(dataset.attrs.get("name", "")) == label and dataset.dtype.kind == "f":
+        if str(dataset.attrs.get("name", "")) == label and dataset.dtype.kind in "fi":
             return np.asarray(dataset[:], np.float64)
     return None

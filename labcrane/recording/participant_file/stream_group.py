@@ -3,9 +3,10 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import (
@@ -15,6 +16,7 @@ from labcrane.recording.foreign_streams import (
     both_clocks,
 )
 from labcrane.recording.participant_file.columns import (
+    EXACT,
     node_names,
     write_attributes,
     write_numbers,
@@ -61,7 +63,7 @@ def _write_stream(group: "h5py.Group", stream: RecordedStream) -> None:
     group.create_group("data")
     for name, values, unit in stream_columns(stream):
         if isinstance(values, np.ndarray):
-            write_numbers(group, name, values, unit)
+            write_numbers(group, name, values, unit, whole=values.dtype == np.int64)
         else:
             write_texts(group, name, values)
     for number, (label, safe) in enumerate(node_names(list(header.labels))):
@@ -82,7 +84,7 @@ def stream_attributes(stream: RecordedStream) -> dict[str, str | float]:
 
 def stream_columns(
     stream: RecordedStream,
-) -> Iterator[tuple[str, FloatArray | Sequence[str], str]]:
+) -> Iterator[tuple[str, npt.NDArray[Any] | Sequence[str], str]]:
     """Yield name, values and unit of each column of a stream, as its recorder had them."""
     yield "time_raw", stream.time_raw, "s"
     yield "starts", np.array(stream.starts, np.float64), "1"
@@ -101,7 +103,11 @@ def stream_columns(
         if stream.header.dtype is None:
             yield f"data/{safe}", [row[number] for row in stream.texts], ""
         else:
-            yield f"data/{safe}", stream.data[:, number].astype(np.float64), channel.unit
+            values: npt.NDArray[Any] = stream.data[:, number]
+            # Only what float64 would round: R reads it without being asked, and int64 not.
+            if values.dtype != np.int64 or not ((values < -EXACT) | (values > EXACT)).any():
+                values = values.astype(np.float64)
+            yield f"data/{safe}", values, channel.unit
 
 
 def write_time(
