@@ -1,6 +1,6 @@
 """Problem report: the files of an archive for a bug report, with nothing of people in them.
 
-What goes in is listed here: versions of packages that labcrane needs, names and times of its own
+What goes in is listed here: versions of libraries that labcrane needs, names and times of its own
 events, numbers, and places in its own code. No text that a person, a study or an error wrote goes
 in.
 """
@@ -17,7 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
-from importlib.metadata import distributions
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +25,14 @@ import numpy as np
 
 from labcrane.core.findings import Verdict
 from labcrane.doctor.report import Diagnosis
-from labcrane.doctor.versions import commit, liblsl
+from labcrane.doctor.versions import LIBRARIES, commit, liblsl, libraries
 from labcrane.errors import RecordingError
 from labcrane.files.atomic import replacing
 from labcrane.recording.crash_marker import crash_marker_path, read_crash_marker
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
 from labcrane.recording.journal_reader import JournalState, SessionLog, read_journal
 from labcrane.recording.paths import journal_path, parts, session_of
-from labcrane.registry.entry_points import entry_points_of, one_name
+from labcrane.registry.entry_points import entry_points_of
 from labcrane.registry.hookspecs import PROJECT
 
 EVENTS = frozenset(
@@ -167,7 +167,7 @@ def _tried(what: str, make: Callable[[], str], missing: list[str]) -> str:
 
 
 def versions() -> str:
-    """Return versions of the system, of labcrane, and of the installed packages that it needs."""
+    """Return versions of the system, of labcrane, and of libraries; no place and no other name."""
     clone = re.search(r"commit ([0-9a-f]+(?:-dirty)?)$", commit(Path(__file__).parents[2]))
     release, lsl = (
         "".join(re.findall(found, text))
@@ -179,24 +179,10 @@ def versions() -> str:
             f"Python {platform.python_version()}",
             f"{PROJECT}, commit {clone[1]}" if clone else f"{PROJECT}, no clone",
             lsl,
-            *(f"{name} {version}" for name, version in sorted(_needed().items())),
-            f"and {len({one_name(each.name) for each in distributions()}) - len(_needed())} others",
+            *(each.partition("+")[0] for each in [f"{PROJECT} {version(PROJECT)}", *libraries()]),
             "",
         ]
     )
-
-
-@cache
-def _needed() -> Mapping[str, str]:
-    """Return the versions of the installed packages that labcrane needs, and of its own."""
-    there = {one_name(each.name): each for each in distributions() if each.name}
-    reached, due = dict[str, str](), [PROJECT]
-    while due:
-        name = one_name(due.pop())
-        if name in there and name not in reached:
-            reached[name] = there[name].version.partition("+")[0]
-            due += [re.split(r"[^\w.-]", each)[0] for each in there[name].requires or ()]
-    return reached
 
 
 @cache
@@ -312,7 +298,7 @@ def _about(
         "versions": {
             name: version
             for name, version in context.get("versions", {}).items()
-            if name in _needed() and re.fullmatch(r"[\d.]+", str(version))
+            if name in {PROJECT, *LIBRARIES} and re.fullmatch(r"[\d.]+", str(version))
         },
         "plugins": sorted(
             _plugin(each.get("plugin")) for each in context.get("components", {}).values()

@@ -26,7 +26,6 @@ GIT_S = 5.0
 def versions() -> Sequence[str]:
     """Return a line each for labcrane, Python, the computer, libraries and plugins."""
     package = Path(__file__).parents[1]
-    libraries = ", ".join(f"{name} {_version(name)}" for name in LIBRARIES)
     others = sorted(
         {
             f"{point.dist.name} {point.dist.version}"
@@ -38,10 +37,15 @@ def versions() -> Sequence[str]:
         f"labcrane {_version(PROJECT)} in {package}{commit(package.parent)}",
         f"Python {platform.python_version()} ({sys.executable})",
         f"computer: {platform.platform()}, {platform.machine()}, {_system()}",
-        f"libraries: {libraries}",
+        f"libraries: {', '.join(libraries())}",
         f"{liblsl()}; {configuration()}",
         f"third-party plugins: {', '.join(others) or 'none'}",
     )
+
+
+def libraries() -> list[str]:
+    """Return the version of each library, as its distribution has it."""
+    return [f"{name} {_version(name)}" for name in LIBRARIES]
 
 
 def commit(root: Path) -> str:
