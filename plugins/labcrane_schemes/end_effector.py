@@ -4,16 +4,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from labcrane import Controller, FloatArray, Machine, ProtocolError, Run
+from labcrane import Controller, FloatArray, Machine, Run
 from labcrane.core import Kernel, Sphere, Value
 from labcrane_schemes.attainable import attainable
 from labcrane_schemes.axis_map import find_axes
 from labcrane_schemes.law import SPEED, block, command, hands, kernel_of, put_sticks
 from labcrane_schemes.settings import DIRECTIONS, EndEffectorSettings
 from labcrane_schemes.signals import rest, scheme_signals
-
-FEWEST_TO_HOLD_PITCH = 4
-"""Joints with which the tip can keep its pitch and still go anywhere."""
 
 
 class EndEffector(Controller):
@@ -26,11 +23,6 @@ class EndEffector(Controller):
     """
 
     def __init__(self, settings: EndEffectorSettings, machine: Machine, share: float = 1.0) -> None:
-        if settings.redundancy == "hold_pitch" and len(machine.joints) < FEWEST_TO_HOLD_PITCH:
-            raise ProtocolError(
-                f"redundancy 'hold_pitch' needs {FEWEST_TO_HOLD_PITCH} joints, but the machine has "
-                f"{len(machine.joints)}; use 'minimum_norm'"
-            )
         self.signals = scheme_signals(machine)
         self._settings = settings
         self._share = share

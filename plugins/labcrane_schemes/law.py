@@ -31,9 +31,9 @@ Numbers = list[float] | FloatArray
 """A block, angles, axes or a command: a list in Python, an array in compiled code."""
 
 (
-    RESOLVED, JOINTS, EDGE, REST, LINEAR, EXPO, STRETCH, STEEPNESS, STRAIGHT, WIDTH, HOLDS,
-    DAMPING2, THRESHOLD2, SPEED, BASE, STRIDE, TABLES,
-) = range(17)  # fmt: skip
+    RESOLVED, JOINTS, EDGE, REST, LINEAR, EXPO, STRETCH, STEEPNESS, STRAIGHT, WIDTH, DAMPING2,
+    THRESHOLD2, SPEED, BASE, STRIDE, TABLES,
+) = range(16)  # fmt: skip
 """Layout of a block: whether it is resolved rate, then its numbers, then its tables."""
 (
     AXIS, FACTOR, LOW, HIGH, LENGTH, OFFSET, FULL, COLUMN_R, COLUMN_Z, SPEEDS, FACTORS, LEAST, MOST,
@@ -89,8 +89,7 @@ def block(
         bool(tip), joints, settings.dead_zone, 1.0 - settings.dead_zone,
         linear, expo, stretch, 3.0 / (linear * stretch) if cubic else 0.0, expo < ROUNDING,
         max(math.radians(settings.soft_stop_deg), 1e-9),  # a wall, not a division by zero
-        tipped is not None and tipped.redundancy == "hold_pitch", damping * damping,
-        threshold * threshold, 0.0, tip == "base", stride,
+        damping * damping, threshold * threshold, 0.0, tip == "base", stride,
     )  # fmt: skip
     tables = np.zeros((N_TABLES, stride))
     tables[LOW, :joints], tables[HIGH, :joints] = np.transpose(machine.limits)
@@ -217,21 +216,14 @@ def weighted(own: Numbers, at: int, angles: Numbers) -> float:
     base, step = at + TABLES, int(own[at + STRIDE])
     low, high, width = base + LOW * step, base + HIGH * step, own[at + WIDTH]
     r, z, n = base + COLUMN_R * step, base + COLUMN_Z * step, int(own[at + JOINTS])
-    total = sum_r = sum_z = rr = rz = zz = 0.0
+    rr = rz = zz = 0.0
     for j in range(1, n):
         near = left(min(angles[j] - own[low + j], own[high + j] - angles[j]), width)
         weight = near * near * near  # a power is not of the same bits when it is compiled
         a, b = own[r + j], own[z + j]
-        total += weight
-        sum_r += weight * a
-        sum_z += weight * b
         rr += weight * a * a
         rz += weight * a * b
         zz += weight * b * b
-    if own[at + HOLDS] != 0.0 and total > 0.0:
-        rr -= sum_r * sum_r / total
-        rz -= sum_r * sum_z / total
-        zz -= sum_z * sum_z / total
     return damping(own, at, rr, rz, zz)
 
 
@@ -250,26 +242,14 @@ def least_squares(own: Numbers, at: int, damping2: float, radial: float, vertica
 
     Return the square of the damping, in m²; it is computed where below 0 is given.
 
-    It is ``Jᵀ (J Jᵀ + λ² I)⁻¹ v``. Where the pitch is held, ``J`` loses the mean of its columns,
-    and the speeds add up to what those at a bound have turned.
+    It is ``Jᵀ (J Jᵀ + λ² I)⁻¹ v``.
     """
     base, step = at + TABLES, int(own[at + STRIDE])
     r, z, speeds = base + COLUMN_R * step, base + COLUMN_Z * step, base + SPEEDS * step
     wanted, bound, n = base + WANTED * step, base + BOUND * step, int(own[at + JOINTS])
-    mean_r = mean_z = turned = count = 0.0
-    if own[at + HOLDS] != 0.0:
-        for j in range(1, n):
-            if own[bound + j] != 0.0:
-                turned += own[speeds + j]
-            else:
-                count += 1.0
-                mean_r += own[r + j]
-                mean_z += own[z + j]
-        count = max(count, 1.0)  # all at a bound leave nothing to share
-        mean_r, mean_z, turned = mean_r / count, mean_z / count, turned / count
     rr = rz = zz = 0.0
     for j in range(1, n):
-        a, b = own[r + j] - mean_r, own[z + j] - mean_z
+        a, b = own[r + j], own[z + j]
         if own[bound + j] != 0.0:
             radial -= a * own[speeds + j]
             vertical -= b * own[speeds + j]
@@ -285,8 +265,7 @@ def least_squares(own: Numbers, at: int, damping2: float, radial: float, vertica
     y_r = (zz * radial - rz * vertical) / det
     y_z = (rr * vertical - rz * radial) / det
     for j in range(1, n):
-        a, b = own[r + j] - mean_r, own[z + j] - mean_z
-        own[wanted + j] = a * y_r + b * y_z - turned
+        own[wanted + j] = own[r + j] * y_r + own[z + j] * y_z
     return damping2
 
 

@@ -85,7 +85,12 @@ class JointVelocitySettings(HandlingSettings):
 
 
 class EndEffectorSettings(HandlingSettings):
-    """Each axis moves the tip along one direction."""
+    """Each axis moves the tip along one direction.
+
+    Of all ways to move it, the joints take that with the smallest speeds: the tip's pitch drifts,
+    and the others take over from a joint at its limit. Where the joints cannot move the tip as
+    asked for, near a limit or a singularity, it goes as nearly that way as they can, and slower.
+    """
 
     map: Annotated[dict[Direction, AxisName], Covers("direction of the frame", own=True), Once()]
     """Which axis moves the tip along which direction: x, y and z of the base frame, or radial,
@@ -101,12 +106,6 @@ class EndEffectorSettings(HandlingSettings):
     """Tip speed at full deflection of one axis, in m/s. By default what the machine's joints
     allow at the study's targets (the median over targets and directions: along the arm, across it
     and up), so that schemes are comparable."""
-
-    redundancy: Literal["minimum_norm", "hold_pitch"] = "minimum_norm"
-    """How the redundant joint is resolved. ``minimum_norm`` minimises the joint speeds: the tip's
-    pitch drifts, and the others take over from a joint at its limit. ``hold_pitch`` keeps the
-    tip's pitch. Where the joints cannot move the tip as asked for, near a limit or a singularity,
-    it goes as nearly that way as they can, and slower."""
 
     damping: Annotated[float, Unit("m")] = Field(default=0.2, gt=0.0, le=1.0)
     """Largest damping of the least squares, in metres, reached at a singularity."""

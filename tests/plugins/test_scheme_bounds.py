@@ -20,20 +20,19 @@ LEAP_M_S = 0.1
 full speeds of 1 m/s per axis."""
 SOFT = math.radians(5.0)
 RIGS = {
-    f"{name} {redundancy} {joints}": (machine, redundancy, joints)
+    f"{name} {joints}": (machine, joints)
     for name, machine in MACHINES.items()
-    for redundancy, joints in (("minimum_norm", 4), ("hold_pitch", 4), ("minimum_norm", 3),
-                               ("minimum_norm", 2))
-}  # fmt: skip
+    for joints in (4, 3, 2)
+}
 
 
 def rigged(rig: str) -> tuple[Machine, list[float]]:
     """Return a machine with so many of its joints, and the block of its scheme."""
-    machine, redundancy, joints = RIGS[rig]
+    machine, joints = RIGS[rig]
     machine = machine.model_copy(update={"joints": machine.joints[:joints]})
     for name in machine.__dict__.keys() - type(machine).model_fields.keys():
         del machine.__dict__[name]  # what was computed of all joints
-    settings = end_effector(redundancy=redundancy, map=BASE, speed_m_s=1.0)
+    settings = end_effector(map=BASE, speed_m_s=1.0)
     scheme = ready(EndEffector(settings, machine), machine)
     assert isinstance(scheme, EndEffector)
     return machine, scheme.law
@@ -105,7 +104,7 @@ EXCAVATOR_DEG = ((-180.0, 180.0), (-60.0, 40.0), (30.0, 150.0), (-30.0, 140.0))
 
 def swings(rig: str, rate_hz: float, seed: int, *, excavator: bool) -> int:
     """Return how often a joint's speed is reversed twice in two ticks while the sticks are held."""
-    machine, redundancy, _ = RIGS[rig]
+    machine, _ = RIGS[rig]
     if excavator:
         about = zip(machine.joints, EXCAVATOR_M, EXCAVATOR_DEG, strict=True)
         links = [each.model_copy(update={"a": a, "range_deg": deg}) for each, a, deg in about]
@@ -113,7 +112,7 @@ def swings(rig: str, rate_hz: float, seed: int, *, excavator: bool) -> int:
         for name in machine.__dict__.keys() - type(machine).model_fields.keys():
             del machine.__dict__[name]
     speed = 2.7 if excavator else 1.0
-    settings = end_effector(redundancy=redundancy, map=BASE, speed_m_s=speed)
+    settings = end_effector(map=BASE, speed_m_s=speed)
     scheme = ready(EndEffector(settings, machine), machine)
     assert isinstance(scheme, EndEffector)
     own, random = scheme.law, np.random.default_rng(seed)
@@ -167,8 +166,6 @@ def test_no_held_stick_freezes_where_the_tip_can_go_there(rig: str) -> None:
         along = way @ moves @ solved(own, pose, way)
         assert along > -1e-9, "the tip never goes against the stick"
         rows = np.column_stack([moves, -way])
-        if "hold_pitch" in rig:
-            rows = np.vstack([rows, [0.0, *[1.0] * (joints - 1), 0.0]])
         least = -full * np.clip((pose - low) / SOFT, 0.0, 1.0)
         most = full * np.clip((high - pose) / SOFT, 0.0, 1.0)
         best = linprog(

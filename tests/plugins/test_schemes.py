@@ -52,12 +52,6 @@ class TestEndEffector(ControllerContract):
         return build("end_effector", settings)
 
 
-class TestEndEffectorHoldingPitch(ControllerContract):
-    @pytest.fixture
-    def controller(self) -> Controller:
-        return build("end_effector", end_effector(redundancy="hold_pitch"))
-
-
 class TestSwitchable(ControllerContract):
     @pytest.fixture(params=["joint_velocity", "end_effector"])
     def controller(self, request: pytest.FixtureRequest) -> Controller:
@@ -130,7 +124,6 @@ def test_steering_inverts_every_scheme(name: str) -> None:
         JointVelocity(joint_velocity(**shape), machine),
         EndEffector(end_effector(**shape), machine),
         EndEffector(end_effector(frame="arm", map=ARM, **shape), machine),
-        EndEffector(end_effector(redundancy="hold_pitch", **shape), machine),
         Switchable(switchable(start="end_effector"), machine),
     ]
     random = np.random.default_rng(5)
@@ -268,10 +261,3 @@ def test_directions_must_fit_the_frame() -> None:
     said = "has no axis for 'radial'; it needs one for each of radial, tangential, vertical"
     with pytest.raises(ProtocolError, match=said):
         scheme.open(make_run(ch8(), command=scheme.signals))
-
-
-def test_holding_pitch_needs_four_joints() -> None:
-    machine = ch8()
-    three = machine.model_copy(update={"joints": machine.joints[:3]})
-    with pytest.raises(ProtocolError, match="needs 4 joints, but the machine has 3"):
-        EndEffector(end_effector(redundancy="hold_pitch"), three)

@@ -42,13 +42,9 @@ def drawn_study(seed: int, scheme: str, rule: str) -> str:
 
     def tip() -> str:
         where = {"base": BASE, "arm": ARM}.get(scheme) or draw.choice([BASE, ARM])
-        redundancy = draw.choice(["minimum_norm", "hold_pitch"])
         threshold = round(draw.uniform(0.2, 3.0), 2)
         speed = round(draw.uniform(0.3, 1.5), 2)
-        return (
-            f"{where}, {handling()}, redundancy: {redundancy}, threshold_m: {threshold}, "
-            f"speed_m_s: {speed}"
-        )
+        return f"{where}, {handling()}, threshold_m: {threshold}, speed_m_s: {speed}"
 
     match scheme:
         case "joint_velocity":
