@@ -14,6 +14,7 @@ from . import (
 from .core.clock import Tick
 from .core.records import Frame, Run, Trial
 from .core.roles import (
+    Capture,
     Controller,
     Cue,
     Dynamics,
@@ -44,6 +45,7 @@ from .types import FloatArray
 __version__: str
 
 __all__ = [
+    "Capture",
     "Controller",
     "Cue",
     "DeviceError",

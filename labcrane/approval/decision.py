@@ -11,6 +11,7 @@ from labcrane.approval.difference import differences
 from labcrane.approval.environment import changes, environment
 from labcrane.approval.lock import FORMAT, VERSION, Lock, lock_path, read_lock
 from labcrane.approval.materials import materials
+from labcrane.approval.recordings import check_consent_names
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import SHARED_FILE, copy
 from labcrane.files.units import unit_of
@@ -167,6 +168,7 @@ def _lock(
             "which it is valid"
         )
     consent = _consent(study, grant.consent)
+    check_consent_names(study, consent)
     return Lock(
         lock_path(study.path),
         {

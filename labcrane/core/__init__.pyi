@@ -12,6 +12,7 @@ from .kernel import Kernel, Places
 from .primitives import Cylinder, Shape, Sphere, TargetFinder
 from .records import (
     CameraImage,
+    Captured,
     Echo,
     Event,
     Phase,
@@ -38,6 +39,7 @@ from .references import (
 )
 from .settings import (
     AtMost,
+    CaptureSettings,
     Names,
     SceneFile,
     StudyPath,
@@ -68,6 +70,8 @@ __all__ = [
     "ButtonName",
     "CameraImage",
     "CameraName",
+    "CaptureSettings",
+    "Captured",
     "Covers",
     "Crane",
     "CraneSettings",

@@ -61,6 +61,37 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
+class Captured:
+    """A frame of a recording that is in its file: a picture, or a piece of sound.
+
+    The uncertainty of its time is the sum of the three terms, in seconds. One that is not known is
+    NaN.
+
+    Attributes
+    ----------
+    number
+        Counted from 0 in each file, with the frames that were dropped.
+    pts
+        Where it is in the file, in seconds.
+    time
+        When it was captured, in seconds on the session's clock.
+    clock
+        How well the clock of the device's timestamp is known.
+    arrival
+        How far the moment of capture is open, because only the arrival of the frame is known.
+    lag
+        How well the device's lag is known, which is subtracted already.
+    """
+
+    number: int
+    pts: float
+    time: float
+    clock: float
+    arrival: float
+    lag: float
+
+
+@dataclass(frozen=True, slots=True)
 class PlannedTrial:
     """One trial as a task plans it.
 

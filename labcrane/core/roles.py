@@ -3,6 +3,7 @@
     InputDevice -> Controller -> Dynamics -> Task        in the session's loop
     SecondaryTask                                        beside the task
     Cue -> Feedback                                      in processes of their own
+    Capture                                              in a process of its own
 
 Each role has exactly one method that runs every tick. The loop calls it directly, never through
 pluggy, so it must return soon and must not block. ``labcrane.testing`` has a contract test for
@@ -29,6 +30,7 @@ if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
     from labcrane.core.primitives import Shape, Sphere
     from labcrane.core.records import (
         CameraImage,
+        Captured,
         Echo,
         Frame,
         PlannedTrial,
@@ -298,6 +300,38 @@ class Trigger(Component):
         now
             In seconds on the session's clock, to end a pulse.
         """
+
+
+class Capture(Component):
+    """A camera, a microphone or a screen, recorded into files next to the participant file.
+
+    It runs in a process of its own, which is started again whenever it fails. ``open`` and
+    ``begin_trial`` are never called. Its settings are
+    :class:`~labcrane.core.settings.CaptureSettings`.
+    """
+
+    suffix: str = ".mkv"
+    """How the names of its files end."""
+
+    @abstractmethod
+    def begin(self) -> None:
+        """Open the device. Runs before the first ``read``; raise DeviceError if it is not there."""
+
+    @abstractmethod
+    def write_to(self, path: Path) -> None:
+        """Write the frames from now on to a new file, for the user only."""
+
+    @abstractmethod
+    def read(self) -> Sequence[Captured]:
+        """Wait for a frame and write it; return the frames that are now safely in the file.
+
+        A frame is in the file when it is there even if the process is killed. Before ``write_to``
+        nothing is written. Raise DeviceError when the device is gone or the disk is full.
+        """
+
+    @abstractmethod
+    def end(self) -> Sequence[Captured]:
+        """End the file; return the frames in it that were not returned yet."""
 
 
 class Cue(Component):

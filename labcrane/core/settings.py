@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ValidationInfo
+from pydantic import AfterValidator, BaseModel, Field, ValidationInfo
 
 from labcrane.core.references import Reference
 from labcrane.errors import look as look  # noqa: PLC0414 - public here
@@ -111,6 +111,18 @@ class Settings(StrictModel):
     def needs(self, machine: Machine) -> Names:
         """Return the names that a component refers to by default, by kind."""
         return {}
+
+
+class CaptureSettings(Settings):
+    """Base of the settings of recordings."""
+
+    consent: str = Field(min_length=1)
+    """The words of the consent text that name this recording: ``We film your face``. A study is not
+    approved with a consent text that does not contain them."""
+
+    required: bool = True
+    """Whether a session waits for it. If it fails later, the session pauses as for a required
+    stream (`on_fault.stream_lost`)."""
 
 
 def _beside(path: Path, info: ValidationInfo) -> Path:

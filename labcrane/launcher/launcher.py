@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from labcrane.capture.processes import RecordingProcesses, index_requests
 from labcrane.core.records import Event
 from labcrane.errors import StreamError
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
@@ -85,6 +86,7 @@ class Launcher:
         self._say = say
         self._recorder: RecorderHandle | None = None
         self._feedback: FeedbackProcesses | None = None
+        self._recordings: RecordingProcesses | None = None
         self._lost: set[str] = set()
         self._taken: set[str] = set()
         self._signals = SignalReporter(say)
@@ -127,16 +129,21 @@ class Launcher:
         ]
         if visit.feedback:
             requests += log_requests(visit)
+        requests += index_requests(visit)
         if requests:
             self._recorder = RecorderHandle(visit.streams_journal, requests, monitor_config(visit))
         report = None
         try:
             if visit.feedback:
                 self._feedback = FeedbackProcesses(visit)
+            if visit.study.recordings:
+                self._recordings = RecordingProcesses(visit)
             died = self._run() if self._gate() else None
         finally:
             if self._feedback:
                 self._feedback.stop()
+            if self._recordings:
+                self._recordings.stop()
             if self._recorder:
                 self._recorder.stop()
             if parts(visit.journal):
@@ -158,10 +165,16 @@ class Launcher:
         if self._feedback and not self._feedback.wait(self._say, self._told_to_end):
             return False
         recorder = self._recorder
+        while self._recordings and not self._recordings.settled:
+            self._watch_recordings()
+            if self._told_to_end():
+                return False
+            time.sleep(LOOK_S)
         told: list[str] = []
         asked = not self._visit.simulated  # no person can answer, and nothing is required
         while recorder is not None and not (recorder.ready and not (asked and recorder.asks)):
             recorder.watch()
+            self._watch_recordings()
             self._kept += self._signals.news(recorder)
             if recorder.complaints() != told:
                 told = recorder.complaints()
@@ -252,6 +265,7 @@ class Launcher:
             if detector.hangs():
                 session.kill()  # its journal is whole; the exit code is passed on as any other
             self._watch_streams(session.send)
+            self._watch_recordings()
             if self._feedback:
                 for news in self._feedback.watch(self._say):
                     session.send(news)
@@ -270,6 +284,12 @@ class Launcher:
                 self._owes = bool(message.data["owed"])
             self._console.report(message)
         return None
+
+    def _watch_recordings(self) -> None:
+        """Start failed recordings again, and tell the recorder where their frames are listed."""
+        if self._recordings and self._recorder:
+            self._recordings.watch(self._say)
+            self._recorder.offer(self._recordings.sends)
 
     def _watch_streams(self, send: Callable[[Message], None]) -> None:
         recorder = self._recorder

@@ -190,6 +190,11 @@ class Protocol(Section):
     )
     """External streams to be recorded, by the study's names for them."""
 
+    recordings: dict[Annotated[str, AfterValidator(_names_a_folder)], Use] = Field(
+        default_factory=dict
+    )
+    """Cameras, microphones and screens to be recorded, by the study's names for them."""
+
     monitors: dict[str, Use] | None = None
     """Monitors of the signals of those streams, by name. Without this key all that
     are installed do, as they are without settings; ``{}`` is none."""

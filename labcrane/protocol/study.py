@@ -10,6 +10,7 @@ from typing import TypeGuard
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.core.records import Value
 from labcrane.core.roles import (
+    Capture,
     Controller,
     Dynamics,
     InputDevice,
@@ -61,6 +62,8 @@ class Study:
         on block by block, views are always there.
     monitors
         Monitors of the signals of streams; None for all that are installed.
+    recordings
+        Cameras, microphones and screens that are recorded, by the protocol's names.
     call_monitor
         Watches over all components that are built.
     recorded
@@ -94,6 +97,7 @@ class Study:
     sounds: dict[str, ComponentSpec] = field(default_factory=dict)
     views: dict[str, ComponentSpec] = field(default_factory=dict)
     monitors: dict[str, ComponentSpec] | None = None
+    recordings: dict[str, ComponentSpec] = field(default_factory=dict)
     call_monitor: CallMonitor = field(default_factory=CallMonitor)
     recorded: bool = False
     beyond_operator: tuple[tuple[Place, str], ...] = ()
@@ -123,11 +127,11 @@ class Study:
         simulated
             Whether the simulated operator takes the place of the input.
         feedback
-            Whether views and sounds are shown.
+            Whether views and sounds are shown, and recordings made.
         """
         used = {**self.choices} | ({"input": self.operator} if simulated else {})
         if not feedback:
-            shown = ("feedback.", "views.")
+            shown = ("feedback.", "views.", "recordings.")
             used = {part: each for part, each in used.items() if not part.startswith(shown)}
         lacks = {each.called: each.offer.missing for each in used.values()}
         if wrong := [f"{called} {what}" for called, what in lacks.items() if what]:
@@ -519,6 +523,9 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     )
     if protocol is not None:
         Checker(source, protocol).check(tasks, questionnaires)
+    recordings = chooser.choose_several(Capture, "recordings")
+    for name in recordings.keys() & (protocol.streams if protocol else {}):
+        source.problem(("recordings", name), f"{name!r} is already the name of a stream", key=True)
     monitors, others = chooser.choose_monitors(), chooser.choose_others()
     named: dict[str, Mapping[str, ComponentSpec]] = {
         "tasks": choices,
@@ -527,6 +534,7 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
         "feedback": cues | sounds,
         "views": views,
         "monitors": monitors or {},
+        "recordings": recordings,
     }
     roles = {"input": device, "scheme": scheme, "dynamics": dynamics}
     there = {part: choice for part, choice in roles.items() if choice}
@@ -565,6 +573,7 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
         sounds=sounds,
         views=views,
         monitors=monitors,
+        recordings=recordings,
         call_monitor=chooser.call_monitor,
         recorded=recorded,
         beyond_operator=beyond,

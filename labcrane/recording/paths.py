@@ -20,6 +20,16 @@ def journal_path(folder: Path, session: int, kind: str) -> Path:
     return folder / f"ses-{session:02d}_{kind}.xdf"
 
 
+def captured_file(journal: Path, name: str, number: int, suffix: str) -> Path:
+    """Return a file of a camera, microphone or screen: ``ses-01_face.mkv``, ``ses-01_face.2.mkv``.
+
+    ``journal`` is the first part of the session's journal; files are counted from 1.
+    """
+    session = journal.name.partition("_")[0]
+    part = "" if number == 1 else f".{number}"
+    return journal.with_name(f"{session}_{name}{part}{suffix}")
+
+
 def participant_path(folder: Path) -> Path:
     """Return the path of the participant file in a participant's folder, whose name it has."""
     return folder / f"{folder.absolute().name}.h5"

@@ -1,4 +1,4 @@
-"""Pictures of a view: the stream of the times when each was shown, and the span of their rate.
+"""Pictures that views showed, and frames that were captured: the streams of their times.
 
 The experimenter's status light rates a view while a session runs, and the tables rate it
 afterwards. Both use this one number, so that they agree.
@@ -6,6 +6,15 @@ afterwards. Both use this one number, so that they agree.
 
 LOG = "labcrane.feedback."
 """Prefix of the streams in which views and sounds log what they presented."""
+
+CAPTURED = "labcrane.capture."
+"""Prefix of the streams that list the frames of cameras, microphones and screens."""
+
+TERMS = ("clock", "arrival", "lag")
+"""Terms of the uncertainty of a frame's time, as of :class:`labcrane.core.records.Captured`."""
+
+CHANNELS = {"frame.number": "1", "file": "1", "pts": "s", **dict.fromkeys(TERMS, "s")}
+"""Channels of these streams, with units; ``file`` is the number of the file."""
 
 RATE_S = 1.0
 """The rate of pictures is how many were shown in so many seconds. Over the whole of a movement a

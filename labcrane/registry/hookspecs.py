@@ -18,6 +18,7 @@ import pluggy
 
 from labcrane.analysis.exporter import Exporter
 from labcrane.core.roles import (
+    Capture,
     Component,
     Controller,
     Cue,
@@ -91,6 +92,12 @@ def labcrane_monitors() -> Sequence[Offer[SignalMonitor]]:
 @hookspec
 def labcrane_triggers() -> Sequence[Offer[Trigger]]:
     """Offer lines that signal events to other devices."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_captures() -> Sequence[Offer[Capture]]:
+    """Offer cameras, microphones and screens to be recorded."""
     raise NotImplementedError
 
 
@@ -221,6 +228,14 @@ ROLES: Mapping[type[Component], RoleEntry] = {
         ("triggers",),
         several=True,
         returns={},
+    ),
+    Capture: RoleEntry(
+        labcrane_captures,
+        "capture",
+        "a camera, microphone or screen to be recorded",
+        ("recordings",),
+        several=True,
+        recorded="every frame in its files",
     ),
     Cue: RoleEntry(
         labcrane_cues,

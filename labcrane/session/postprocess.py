@@ -18,10 +18,10 @@ from labcrane.recording.participant_file.reader import SessionRecord, Stream, se
 from labcrane.recording.participant_file.recorrect import read_channel, read_stream
 from labcrane.recording.participant_file.session_group import write_sync_report
 from labcrane.recording.participant_file.stream_group import write_time, write_uncorrected
-from labcrane.recording.pictures import LOG
+from labcrane.recording.pictures import CAPTURED, LOG, TERMS
 from labcrane.streams.edges import QUIET_S, Change
 from labcrane.streams.recorder.health import counter_label
-from labcrane.streams.sync.correction import Treatment, correct
+from labcrane.streams.sync.correction import Treatment, as_stated, correct
 from labcrane.streams.sync.pool import pooled
 from labcrane.streams.sync.raw import RawStream, raw_of, unwrapped
 from labcrane.streams.sync.report.limits import Limits
@@ -118,7 +118,12 @@ def _corrected(one: _Read, raw: RawStream, end: float | None, limits: Limits) ->
     """Write a stream's times, and return how right they are."""
     try:
         treatment = _treatment(one)
-        corrected = correct(raw, treatment, end)
+        captured = one.recorded.header.name.startswith(CAPTURED)
+        if captured:
+            terms = [one.group[f"data/{term}"][:] for term in TERMS]
+            corrected = as_stated(raw.stamps, terms, end)
+        else:
+            corrected = correct(raw, treatment, end)
     # One stream's clock must not keep a session from its file; nor may what nobody foresaw of it.
     except Exception as error:  # noqa: BLE001
         why = str(error) if isinstance(error, LabcraneError) else f"{error!r}; please report this"

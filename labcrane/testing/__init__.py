@@ -9,6 +9,7 @@ In comes a component that is built and not yet open, which the fixture returns; 
 name the promise it breaks. Each contract opens it beside stand-ins for the other roles.
 """
 
+from labcrane.testing.captures import CaptureContract
 from labcrane.testing.commands import CommandContract
 from labcrane.testing.components import PluginContract, check_closes_after_failed_open, check_soon
 from labcrane.testing.examinations import ExaminationContract
@@ -42,6 +43,7 @@ __all__ = [
     "RATE_HZ",
     "STICKS",
     "TARGETS",
+    "CaptureContract",
     "CommandContract",
     "ControllerContract",
     "CueContract",

@@ -100,6 +100,7 @@ def examined(
     LabcraneError
         With one line for every mistake.
     """
+    from labcrane.approval.lock import lock_path
     from labcrane.files.names import COHORT
     from labcrane.files.system import is_there
     from labcrane.protocol.questions import questions
@@ -108,6 +109,11 @@ def examined(
 
     study = load(protocol, discover(study=protocol))
     study.check_installed(simulated=simulated, feedback=not simulated)
+    if study.recordings and is_there(lock_path(protocol)):
+        from labcrane.approval.lock import read_lock
+        from labcrane.approval.recordings import check_consent_names
+
+        check_consent_names(study, read_lock(protocol).consent)
     if is_there(cohort := protocol.resolve().with_name(COHORT)):
         from labcrane.simulation.population import read_population
 

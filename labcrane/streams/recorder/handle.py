@@ -184,7 +184,7 @@ class RecorderHandle:
     def offer(self, streams: Sequence[str]) -> None:
         """Tell the recorders of streams on this computer, by description: they need no search."""
         if new := [one for one in streams if one not in self._offered]:
-            self._offered = tuple(streams)
+            self._offered += tuple(new)
             for recorder in self._recorders:
                 recorder.tell({KNOWN: new})
 

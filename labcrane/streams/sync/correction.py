@@ -17,6 +17,7 @@ Nothing recorded is altered, and nothing here depends on when it runs: it can be
 """
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -166,6 +167,18 @@ def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> C
         error = error + repeats.back_s(raw.stamps)
         quality = replace(found.quality, backward=again, **_errors(time, error, uneven))
     return Corrected(time, error, uneven, repeats.put_back(found.segments, own), quality)
+
+
+def as_stated(time: FloatArray, terms: Sequence[FloatArray], end: float | None) -> Corrected:
+    """Return the times of captured frames: on our clock already, with a stated uncertainty.
+
+    The process that captures is on this computer and converts the device's stamps itself: neither
+    probes nor arrivals tell more. An error is NaN where one of its terms is unknown.
+    """
+    error = np.sum(terms, axis=0)
+    silent = end - float(time[-1]) if end is not None and len(time) else 0.0
+    quality = Quality(silent_s=silent, **_errors(time, error, time))
+    return Corrected(time, error, time, quality=quality)
 
 
 def _went_back(stamps: FloatArray) -> bool:

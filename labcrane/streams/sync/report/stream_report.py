@@ -14,6 +14,7 @@ from labcrane.recording.foreign_streams import (
     UNSTAMPED,
     RecordedStream,
 )
+from labcrane.recording.pictures import CAPTURED
 from labcrane.streams.probes import FASTER
 from labcrane.streams.sync.quality import Quality
 from labcrane.streams.sync.raw import ASSUMED_RTT_S
@@ -70,11 +71,17 @@ def judge_stream(
     quality = replace(quality, dropped=max(quality.dropped, _missing(recorded)))
     samples = len(recorded.time_raw)
     header = recorded.header
+    captured = header.name.startswith(CAPTURED)
     if samples == 0:
         findings = [_empty(required=required)]
+    elif captured:
+        findings = _captured(quality, samples, limits, required=required)
     else:
         findings = judge_quality(quality, header.rate_hz, samples, limits, required=required)
     findings += _noted(recorded) + _unwritten(recorded)
+    unknown = unknowable(quality) if _probed_in_full(recorded) else UNWRITTEN
+    if captured:
+        unknown = "the lag of its device, beyond what is declared"
     return StreamReport(
         header.name,
         header.type,
@@ -86,7 +93,7 @@ def judge_stream(
         tuple(findings),
         tuple(sorted(faults(quality, header.rate_hz))) if samples else (),
         tuple(corrections(quality)),
-        unknowable(quality) if _probed_in_full(recorded) else UNWRITTEN,
+        unknown,
         carries(quality) + ("" if len(recorded.arrivals) or not samples else IF_ITS_OWN),
         _taken(recorded),
     )
@@ -139,6 +146,18 @@ def judge_quality(
         findings.append(_died(quality, nominal, required=required))
     findings += _clock(quality, limits) + _changes(quality) + _certainty(quality, limits)
     return findings
+
+
+def _captured(quality: Quality, samples: int, limits: Limits, *, required: bool) -> list[Finding]:
+    """Judge the frames of a recording, whose times are on the session's clock already."""
+    findings = _flow(0.0, samples, quality, limits)
+    if limits.silent_s.judge(quality.silent_s) is not Verdict.PASS:
+        findings.append(_died(quality, 0.0, required=required))
+    if not np.isnan(quality.error_p95_s):
+        return findings + _certainty(quality, limits)
+    text = "the lag of its device is not declared, so that the uncertainty of its times is unknown"
+    advice = "measure the lag, and write lag_s and lag_error_s into the protocol"
+    return [*findings, Finding(Verdict.WARN, text, advice)]
 
 
 def _missing(recorded: RecordedStream) -> int:

@@ -1,0 +1,135 @@
+"""The process of one recording: a camera, a microphone or a screen.
+
+It is started by a :class:`labcrane.processes.handle.ProcessHandle` with a
+:class:`labcrane.capture.config.CaptureConfig` and ends when its parent does. Its frames are listed
+in a stream, which the session's recorders take. It reports the stream (``sends``), the file that
+was begun (``file``), the dropped frames (``missed``, which is its beat as well), and the reason
+for which it ends (``failed``).
+"""
+
+import itertools
+import sys
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from labcrane.capture.config import CaptureConfig
+from labcrane.core.records import Captured
+from labcrane.core.roles import Capture
+from labcrane.errors import LabcraneError
+from labcrane.processes.parent import Parent
+from labcrane.protocol.study import load
+from labcrane.recording.paths import captured_file
+from labcrane.recording.pictures import CHANNELS
+from labcrane.registry.registry import discover
+from labcrane.registry.traceback import told
+from labcrane.streams.outlets import SampleOutlet, channel, check_clock, stream_info
+
+BEAT_S = 0.5
+TAKEN_S = 45.0
+"""How long the recorder may take to receive the stream."""
+
+DELIVERY_S = 0.3
+"""How long the recorders are left to take what was sent last."""
+
+
+def run(config: CaptureConfig, parent: Parent) -> None:
+    """Record until the parent is gone; raises what the recording raises."""
+    study = load(config.study, discover(study=config.study), recorded=config.recorded)
+    recording = study.recordings[config.name].build(study.machine)
+    assert isinstance(recording, Capture)  # noqa: S101 - an offer of this role
+    check_clock()
+    try:
+        recording.begin()
+        _follow(config, parent, recording)
+    finally:
+        recording.close()
+
+
+def _follow(config: CaptureConfig, parent: Parent, recording: Capture) -> None:
+    index = _Index(config, parent)
+    while not index.taken and not parent.gone.is_set():
+        recording.read()
+        index.beat()
+    first, suffix = config.journal, recording.suffix
+    files = ((at, captured_file(first, config.name, at, suffix)) for at in itertools.count(1))
+    number, path = next((at, path) for at, path in files if not path.exists())
+    recording.write_to(path)
+    parent.tell({"file": path.name})
+    try:
+        while not parent.gone.is_set():
+            index.push(number, recording.read())
+    finally:
+        index.push(number, recording.end())
+        time.sleep(DELIVERY_S)
+
+
+class _Index:
+    """The stream that lists the frames."""
+
+    def __init__(self, config: CaptureConfig, parent: Parent) -> None:
+        info = stream_info(
+            config.stream,
+            "Capture",
+            len(CHANNELS),
+            "double64",
+            rate_hz=0.0,
+            source=config.source,
+        )
+        # As of any camera: frames may be missing.
+        info.desc().child("synchronization").set_child_value("can_drop_samples", "true")
+        for label, unit in CHANNELS.items():
+            channel(info, label=label, unit=unit, type="Capture")
+        self._outlet = SampleOutlet(info, len(CHANNELS))
+        self._parent = parent
+        self._last = -1
+        self._missed = 0
+        self._beaten = 0.0
+        self._opened = time.monotonic()
+        parent.tell({"sends": self._outlet.description})
+
+    @property
+    def taken(self) -> bool:
+        """Whether the recorder receives it: samples without a receiver are lost."""
+        if not self._outlet.taken and time.monotonic() - self._opened > TAKEN_S:
+            raise LabcraneError(
+                f"no recorder has received its list of frames for {TAKEN_S:g} s; labcrane doctor "
+                "shows whether a firewall blocks this computer's own streams"
+            )
+        return self._outlet.taken
+
+    def push(self, file: int, frames: Sequence[Captured]) -> None:
+        for each in frames:
+            self._missed += each.number - self._last - 1
+            self._last = each.number
+            row = (each.number, file, each.pts, each.clock, each.arrival, each.lag)
+            self._outlet.push(np.array(row, np.float64), each.time)
+        self.beat()
+
+    def beat(self) -> None:
+        if (now := time.monotonic()) - self._beaten >= BEAT_S:
+            self._beaten = now
+            self._parent.tell({"missed": self._missed})
+
+
+def main() -> int:
+    """Run one recording's process; return its exit status."""
+    parent = Parent()
+    if (config := parent.order()) is None:
+        return 0
+    try:
+        run(config, parent)
+    except LabcraneError as error:
+        parent.tell({"failed": str(error)})
+        return 1
+    except Exception as error:
+        parent.tell({"failed": told(error)})
+        raise  # a plugin's mistake: its author needs the traceback
+    finally:
+        parent.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
