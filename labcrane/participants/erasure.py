@@ -1,5 +1,6 @@
 """Erase a participant."""
 
+import re
 import shutil
 from dataclasses import dataclass
 from datetime import date
@@ -46,6 +47,9 @@ class Erased:
     mentions: list[str]
     unsearched: list[str]
 
+
+FILM = re.compile(r"ses-[0-9]+_.+\.mkv")
+"""Names of the files of cameras, microphones and screens."""
 
 BEYOND = (
     "labcrane cannot reach backups, snapshots, copies made by hand and remains of deleted files on "
@@ -127,7 +131,8 @@ def mentions(places: Places, participant: str) -> tuple[list[str], list[str]]:
     """Return files with the pseudonym in name or content, and files that could not be searched.
 
     Of the data folder, and of all exports. What is packed is opened. The register is left out: it
-    keeps the erasure record.
+    keeps the erasure record. So are films: no name is written into them, and among their bytes any
+    pseudonym comes up by chance.
     """
     register = read(places)
     names = Mentions({*register.names(), participant})
@@ -137,6 +142,8 @@ def mentions(places: Places, participant: str) -> tuple[list[str], list[str]]:
     found, unsearched = [], []
     for path in dict.fromkeys([*places.files(), *written]):
         if path == places.register or path.is_symlink() or not path.is_file():
+            continue
+        if FILM.fullmatch(path.name):
             continue
         under = path.relative_to(places.root) if path.is_relative_to(places.root) else path.name
         done = searched(path, names)

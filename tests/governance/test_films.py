@@ -1,0 +1,129 @@
+"""Films of people: consent that names them, and no byte left of who is erased."""
+
+from pathlib import Path
+
+import pytest
+from governance.kept_people import REASON, check_erased, copied, files, store_of
+from governed import GOVERNED, TODAY, Lab, edit
+
+from labcrane import ProtocolError
+from labcrane.cli.commands.check import examined
+from labcrane.participants import recovery as unfinished
+from labcrane.participants.copies import inventory
+
+FILMED = GOVERNED + (
+    "recordings:\n  face: {use: camera, device: /dev/video9, consent: we film your face}\n"
+)
+
+
+def filmed(lab: Lab) -> dict[str, bytes]:
+    """Put films next to everybody's participant file, and return the content of each."""
+    made = {}
+    for name in ("P001", "P002", "P007"):
+        for file in ("ses-01_face.mkv", "ses-01_face.2.mkv"):
+            made[f"{name}/{file}"] = f"face of {name[1:]} {file}".encode() * 1000
+            (lab.places.raw(name) / file).write_bytes(made[f"{name}/{file}"])
+    return made
+
+
+@pytest.fixture
+def lab(recorded: Lab, tmp_path: Path) -> Lab:
+    return copied(recorded, tmp_path)
+
+
+def test_films_are_transferred_and_listed_with_their_session(lab: Lab) -> None:
+    filmed(lab)
+    done = unfinished.move(lab.places, store_of(lab))
+    assert "P007/ses-01_face.2.mkv" in done.copied
+    stored, here = files(store_of(lab) / "rehearsal"), files(lab.places.root)
+    assert len([name for name in stored if name.endswith(".mkv")]) == 6
+    assert all(here[name] == sha for name, sha in stored.items())
+
+
+def test_a_film_of_an_unfinished_session_is_not_transferred(lab: Lab) -> None:
+    filmed(lab)
+    folder = lab.places.raw("P001")
+    (folder / "ses-02_run.xdf").write_bytes((folder / "ses-01_run.xdf").read_bytes())
+    (folder / "ses-02_face.mkv").write_bytes(b"a face")
+    done = unfinished.move(lab.places, store_of(lab))
+    assert "P001/ses-02_face.mkv" not in done.copied
+
+
+@pytest.mark.slow
+def test_erasing_leaves_no_byte_of_a_film_here_or_in_the_store(lab: Lab) -> None:
+    made = filmed(lab)
+    unfinished.move(lab.places, store_of(lab))
+    done = unfinished.erase(lab.places, "P007", REASON, TODAY)
+    check_erased(lab)
+    assert done.mentions == []
+    for root in (lab.places.root, store_of(lab)):
+        left = {path: path.read_bytes() for path in root.rglob("*") if path.is_file()}
+        assert not [path for path, held in left.items() if b"face of 007" in held]
+        films = {
+            p.relative_to(p.parents[1]).as_posix(): b for p, b in left.items() if p.suffix == ".mkv"
+        }
+        assert films == {name: held for name, held in made.items() if "P007" not in name}
+
+
+@pytest.mark.slow
+def test_relabelling_moves_films_with_their_participant(lab: Lab) -> None:
+    made = filmed(lab)
+    unfinished.move(lab.places, store_of(lab))
+    unfinished.correct(lab.places, "P007", "P008", "typed wrongly", TODAY)
+    for root in (lab.places.root, store_of(lab) / "rehearsal"):
+        assert not (root / "P007").exists()
+        for file in ("ses-01_face.mkv", "ses-01_face.2.mkv"):
+            assert (root / "P008" / file).read_bytes() == made[f"P007/{file}"]
+
+
+def test_where_lists_the_folder_with_the_films(lab: Lab) -> None:
+    filmed(lab)
+    listed = str(inventory(lab.places, "P007"))
+    assert str(lab.places.raw("P007")) in listed
+
+
+def test_bytes_of_a_film_that_look_like_a_pseudonym_are_not_reported(lab: Lab) -> None:
+    (lab.places.raw("P001") / "ses-01_face.mkv").write_bytes(b"\x00\x01 P007 \x02")
+    assert unfinished.erase(lab.places, "P007", REASON, TODAY).mentions == []
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Lab:
+    return Lab(tmp_path, FILMED)
+
+
+def test_a_study_is_not_approved_with_a_consent_text_that_does_not_name_a_recording(
+    study: Lab,
+) -> None:
+    with pytest.raises(
+        ProtocolError, match=r"study\.yaml:\d+.*does not contain 'we film your face'.*'face'"
+    ):
+        study.approve()
+    edit(study.folder / "consent_v2.txt", "I take part.", "I know that We film\nyour FACE.")
+    study.approve()
+
+
+def test_check_compares_the_recordings_with_the_consent_text_of_the_approval(study: Lab) -> None:
+    edit(study.folder / "consent_v2.txt", "I take part.", "We film your face.")
+    study.approve()
+    edit(study.protocol, "we film your face", "we film your hands")
+    with pytest.raises(ProtocolError, match="does not contain 'we film your hands'"):
+        examined(study.protocol)
+
+
+def test_a_consent_text_that_is_not_text_cannot_name_a_recording(study: Lab) -> None:
+    (study.folder / "consent_v2.txt").write_bytes(b"%PDF-1.7 \xff\xfe")
+    with pytest.raises(ProtocolError, match=r"cannot be read as text.*give a text file"):
+        study.approve()
+
+
+def test_two_recordings_and_streams_do_not_share_a_name(tmp_path: Path) -> None:
+    lab = Lab(tmp_path, FILMED + "streams: {face: {type: EEG}}\n")
+    with pytest.raises(ProtocolError, match="'face' is already the name of a stream"):
+        _ = lab.study
+
+
+def test_a_recordings_name_is_the_name_of_a_file(tmp_path: Path) -> None:
+    lab = Lab(tmp_path, FILMED.replace("face: {", "'../face': {"))
+    with pytest.raises(ProtocolError, match=r"\.\./face"):
+        _ = lab.study
