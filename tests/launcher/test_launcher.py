@@ -1,6 +1,7 @@
 """What people say before a session runs, and recorders that hang or do not end in order."""
 
 import os
+import threading
 from pathlib import Path
 
 import psutil
@@ -207,3 +208,31 @@ def test_a_recorder_that_dies_as_it_is_given_its_orders_is_replaced(
     assert handle.watch()
     assert handle.restarts == recorder_handle.RECORDERS
     handle.stop()
+
+
+FILMED = "recordings: {face: {use: camera, device: /dev/no-camera, consent: we film your face}}\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("required", [True, False])
+def test_a_person_is_not_recorded_until_a_required_camera_is_there(
+    tmp_path: Path, *, required: bool
+) -> None:
+    protocol = tmp_path / "study.yaml"
+    filmed = FILMED.replace("consent:", f"required: {str(required).lower()}, consent:")
+    text = STUDY.format(study=unique("filmed")) + filmed
+    protocol.write_text(text, encoding="utf-8")
+    console, said = QueueConsole(), []
+    visit = visit_of(protocol, "P001", 1, tmp_path / "data", pilot=True, feedback=False)
+    launcher = Launcher(visit, console, said.append)
+    begun: list[bool] = []
+    launcher._run = lambda: begun.append(True)
+    thread = threading.Thread(target=launcher.run)
+    thread.start()
+    failed = "face: failed: '/dev/no-camera' (v4l2) cannot be opened: "
+    wait_for(lambda: any(failed in line for line in said))
+    console.give(Command(Order.END))
+    thread.join(60)
+    assert not thread.is_alive()
+    assert begun == ([] if required else [True])
+    assert len([line for line in said if failed in line]) == 1  # and not at each attempt
