@@ -29,8 +29,8 @@ from benchmarks.table import Row, missed
 
 SUBJECTS = (
     "tick", "secondary", "scenario", "oversight", "beside", "real_time", "recording", "length",
-    "sync", "signals", "view", "viewer", "sound", "analysis", "report", "cohort", "start_up",
-    "pages",
+    "sync", "signals", "view", "viewer", "sound", "film", "analysis", "report", "cohort",
+    "start_up", "pages",
 )  # fmt: skip
 NEEDS = {
     "beside": ("jackd", "jack_wait"), "real_time": ("jackd", "jack_wait"), "sync": ("gcc",),
