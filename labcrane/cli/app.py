@@ -27,7 +27,7 @@ from labcrane.errors import (
 
 MODULES = {
     "run": ("demo", "run", "resume"),
-    "check": ("new_study", "check", "plan"),
+    "check": ("start", "new_study", "check", "plan"),
     "doctor": ("doctor", "report_problem"),
     "plugins": ("schema", "new_plugin"),
     "language_server": ("language_server",),
@@ -143,10 +143,10 @@ def commands(words: Sequence[str]) -> typer.Typer:
     app.callback()(_labcrane)
     everything = COMPLETING in os.environ
     if first in known:
-        app.command(first, cls=Plain)(_function(known[first], first))
+        app.command(first, cls=Plain)(function_of(known[first], first))
         return app
     for name, module in known.items():
-        run = _function(module, name)
+        run = function_of(module, name)
         about = extension.first_line(run)
         app.command(name, short_help=about)(run if everything else _stub(run))
     if first == PLUGINS or everything:
@@ -155,12 +155,13 @@ def commands(words: Sequence[str]) -> typer.Typer:
         extension.add(app, PLUGINS, "List installed plugins.")
     extension.add(app, FEEDBACK, "Views and sounds: preview.")
     if first == FEEDBACK or everything:
-        extension.fill(app, FEEDBACK, {"preview": _function(FEEDBACK, "preview")})
+        extension.fill(app, FEEDBACK, {"preview": function_of(FEEDBACK, "preview")})
     extension.extend(app, first, everything=everything)
     return app
 
 
-def _function(module: str, name: str) -> Callable[..., None]:
+def function_of(module: str, name: str) -> Callable[..., None]:
+    """Return the function of a command."""
     there = import_module(f"labcrane.cli.commands.{module}")
     found: Callable[..., None] = getattr(there, name.replace("-", "_"))
     return found

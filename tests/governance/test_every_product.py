@@ -212,7 +212,7 @@ IN_THE_DATA_FOLDER = {
 
 OF_NOBODY = {
     "demo", "simulate", "tracks", "doctor", "approve", "amend", "methods",
-    "bundle", "report-problem", "schema", "new-study", "new-plugin", "streams", "record",
+    "bundle", "report-problem", "schema", "start", "new-study", "new-plugin", "streams", "record",
     "gateway can", "dmd fit", "dmd plot", "dmd record", "dmd validate",
 }  # fmt: skip
 """They write of simulated operators, a computer, a machine or a protocol, and no pseudonym."""

@@ -1,4 +1,4 @@
-"""Commands before anything is run: new-study, check and plan."""
+"""Commands before anything is run: start, new-study, check and plan."""
 
 import json
 from collections.abc import Sequence
@@ -16,6 +16,43 @@ if TYPE_CHECKING:
     from labcrane.design.tracks import PlannedTrack
     from labcrane.protocol.questions import CheckQuestion
     from labcrane.protocol.study import Study
+
+
+def start(
+    folder: Annotated[
+        Path | None,
+        typer.Argument(metavar="FOLDER", help="folder of your studies; by default this one"),
+    ] = None,
+    port: Annotated[int, typer.Option(help="port of the page; 0 selects a free one")] = 0,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="open the page in the browser")
+    ] = True,
+) -> None:
+    """Make, check, rehearse and run a study in a browser, without writing YAML."""
+    import webbrowser
+
+    from labcrane.cli.offered import offered
+    from labcrane.cli.shipped import shipped_studies
+    from labcrane.errors import PluginError, StorageError
+    from labcrane.registry.offers import LAB, not_installed
+
+    if missing := not_installed({"nicegui": LAB}):
+        raise PluginError(f"the start page {missing}")
+    from labcrane.start.service import serve
+    from labcrane.web.handle import free_port
+    from labcrane.web.server.serving import HOST
+
+    root = (folder or Path()).resolve()
+    if not root.is_dir():
+        raise StorageError(f"{root} is not a folder; give the folder of your studies")
+
+    def say(line: str) -> None:
+        out.print(line, markup=False)
+        if browser and line.startswith("start: "):
+            webbrowser.open(line.removeprefix("start: "))
+
+    out.print("Ctrl-C ends it", markup=False)
+    serve(root, sorted(shipped_studies()), list(offered()), free_port(HOST, port), say)
 
 
 def new_study(

@@ -36,6 +36,9 @@ VIEWER = "viewer"
 STUDY = "study"
 """The page of a whole study; it orders nothing either."""
 
+START = "start"
+"""The page on which a study is made; its requests are its own."""
+
 
 @dataclass
 class AccessKeys:

@@ -29,7 +29,7 @@ time for the actions of others."""
 MOST_REST_S = 0.1
 """Rest after a page at most: one that waited for something has not taken this process's time."""
 
-PAGES = frozenset({"/supervisor", "/participant", "/viewer", "/study"})
+PAGES = frozenset({"/supervisor", "/participant", "/viewer", "/study", "/start"})
 MOST_SOCKETS = LIMITS["sockets"].most
 MOST_ADDRESSES = 1024
 

@@ -1,0 +1,213 @@
+"""Document: a study's file while it is edited, with its draft on the disk and its undo.
+
+What is typed is in a hidden draft next to the file within the same request: a computer that stops
+loses nothing. The draft's name holds the hash of the file that it was begun from.
+"""
+
+import glob
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from labcrane.approval.lock import lock_path
+from labcrane.errors import ProtocolError
+from labcrane.files.atomic import SHARED_FILE, write_text
+from labcrane.files.yaml import parse_yaml, read_text
+from labcrane.start.text import positions
+
+HASH = 16
+"""Hexadecimal digits of a hash in a draft's name."""
+
+
+class NewerFileError(ProtocolError):
+    """Another program has changed the file since it was opened."""
+
+
+class ApprovedError(ProtocolError):
+    """The study is approved; saving it is a change that ``labcrane amend`` has to record."""
+
+
+@dataclass
+class Document:
+    """A study's file and its text, as far as it was edited.
+
+    Attributes
+    ----------
+    base
+        Hash of the file from which the text comes.
+    revision
+        Grows with every change, so that two windows never overwrite each other.
+    """
+
+    path: Path
+    base: str
+    text: str
+    revision: int = 0
+    restored: bool = False
+    _undo: list[str] = field(default_factory=list)
+    _redo: list[str] = field(default_factory=list)
+    _draft: Path | None = None
+
+    @classmethod
+    def open(cls, path: Path) -> "Document":
+        """Open a file, with the draft of it that was not saved.
+
+        Raises
+        ------
+        ProtocolError
+            The file cannot be read as text, or has two kinds of line ends.
+        """
+        text = read_text(path)
+        raw = path.read_bytes()
+        if 0 < raw.count(b"\r\n") < raw.count(b"\n"):
+            raise ProtocolError(
+                f"{path} has line ends of Windows and of other systems; save it with one kind"
+            )
+        opened = cls(path, _hash(raw), text)
+        for draft in _drafts(path):
+            unsaved = draft.read_text(encoding="utf-8")
+            opened._undo.append(opened.text)
+            opened.text, opened.base = unsaved, draft.name.split(".")[-2]
+            opened.restored, opened._draft = True, draft
+        return opened
+
+    @property
+    def draft(self) -> Path:
+        """The file of the text as it is edited; it is checked there, next to what it refers to."""
+        return self.path.with_name(f".{self.path.name}.{self.base}.unsaved")
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether the text differs from the file."""
+        return self._draft is not None
+
+    def change(self, revision: int, text: str) -> None:
+        """Take a new text, and put the one before on the stack of undo.
+
+        Raises
+        ------
+        ProtocolError
+            ``revision`` is not the current one: another window has changed the text.
+        """
+        self._check(revision)
+        if text != self.text:
+            self._undo.append(self.text)
+            self._redo.clear()
+            self._become(text)
+
+    def undo(self, revision: int) -> None:
+        """Take the last change back; nothing without one."""
+        self._check(revision)
+        if self._undo:
+            self._redo.append(self.text)
+            self._become(self._undo.pop())
+
+    def redo(self, revision: int) -> None:
+        """Make the change again that was taken back last."""
+        self._check(revision)
+        if self._redo:
+            self._undo.append(self.text)
+            self._become(self._redo.pop())
+
+    def save(self, revision: int, *, over_newer: bool = False, over_approved: bool = False) -> None:
+        """Write the file.
+
+        Raises
+        ------
+        NewerFileError, ApprovedError
+            The file has changed, or is approved, and this was not agreed to.
+        """
+        self._check(revision)
+        if self.changed_on_disk and not over_newer:
+            raise NewerFileError(f"{self.path} was changed by another program since it was opened")
+        if self.approved and not over_approved:
+            raise ApprovedError(
+                f"{self.path} is approved; after a change, sessions run only once labcrane amend "
+                "has recorded it"
+            )
+        ends = "\r\n" if b"\r\n" in self._raw() else "\n"
+        write_text(self.path, self.text.replace("\n", ends), SHARED_FILE)
+        self._drop()
+        self.base, self.restored = _hash(self._raw()), False
+
+    def reload(self, revision: int) -> None:
+        """Take the file as another program left it; undo brings the text back."""
+        self._check(revision)
+        text, before = read_text(self.path), self.text
+        self._undo.append(before)
+        self._drop()
+        self.text, self.base, self.restored = text, _hash(self._raw()), False
+        self.revision += 1
+
+    @property
+    def changed_on_disk(self) -> bool:
+        """Whether another program has changed the file, or removed it."""
+        return _hash(self._raw()) != self.base
+
+    @property
+    def approved(self) -> bool:
+        """Whether the study has a lock."""
+        return lock_path(self.path).exists()
+
+    def shown(self) -> dict[str, Any]:
+        """Return all that a page shows of it."""
+        data, places, why = None, [], ""
+        try:
+            data, places = parse_yaml(self.text, self.path.name), positions(self.text)
+        except ProtocolError as error:
+            why = str(error)
+        return {
+            "path": str(self.path),
+            "name": self.path.name,
+            "folder": str(self.path.parent),
+            "revision": self.revision,
+            "text": self.text,
+            "data": data,
+            "places": places,
+            "unreadable": why,
+            "unsaved": self.unsaved,
+            "restored": self.restored,
+            "newer": self.changed_on_disk,
+            "approved": self.approved,
+            "undo": bool(self._undo),
+            "redo": bool(self._redo),
+            "files": sorted(
+                each.relative_to(self.path.parent).as_posix()
+                for pattern in ("*", "*/*")
+                for each in self.path.parent.glob(pattern)
+                if each.suffix in {".md", ".txt", ".yaml"} and not each.name.startswith(".")
+            ),
+        }
+
+    def _check(self, revision: int) -> None:
+        if revision != self.revision:
+            raise ProtocolError("another window has changed the study; reload this page")
+
+    def _become(self, text: str) -> None:
+        if _hash(self._raw()) == self.base and text == read_text(self.path):
+            self._drop()
+        else:
+            write_text(self.draft, text, SHARED_FILE)
+            self._draft = self.draft
+        self.text = text
+        self.revision += 1
+
+    def _drop(self) -> None:
+        for draft in _drafts(self.path):
+            draft.unlink(missing_ok=True)
+        self._draft = None
+
+    def _raw(self) -> bytes:
+        try:
+            return self.path.read_bytes()
+        except FileNotFoundError:
+            return b""
+
+
+def _drafts(path: Path) -> list[Path]:
+    return sorted(path.parent.glob(f".{glob.escape(path.name)}.*.unsaved"))
+
+
+def _hash(raw: bytes) -> str:
+    return hashlib.sha256(raw).hexdigest()[:HASH]

@@ -1,0 +1,340 @@
+"""Service of the start page: studies of one folder, the open one, and the commands that run.
+
+Every request but the page itself is JSON. A request never names a path outside the folder, and a
+study is written only after its text has been compared with the file.
+"""
+
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from inspect import signature
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import labcrane.web.study
+from labcrane.errors import LabcraneError, ProtocolError
+from labcrane.files.study_folder import OURS, YAML
+from labcrane.start.document import ApprovedError, Document, NewerFileError
+from labcrane.start.jobs import Job, OfferedCommand
+from labcrane.start.recent import recent, remember
+from labcrane.start.text import edited
+from labcrane.web.server.access import START
+from labcrane.web.server.serving import serve_here
+
+if TYPE_CHECKING:
+    from starlette.requests import Request
+    from starlette.responses import Response
+
+HERE = Path(__file__).parent
+DEPTH = ("*", "*/*", "*/*/*")
+"""How deep studies are looked for in the folder."""
+
+PATIENCE_S = 120.0
+"""How long a check, a copy or the schema may take."""
+
+STYLE = Path(labcrane.web.study.__file__).with_name("study.css")
+ASSETS = {
+    each.name: each
+    for each in (*map(HERE.joinpath, ("start.js", "form.js", "start.css", "words.json")), STYLE)
+}
+"""The page's own files, and the style of the study's page."""
+
+BAD_REQUEST, NOT_FOUND, REFUSED = 400, 404, 409
+PICTURES = {".png": "image/png"}
+
+
+class Workspace:
+    """All that one start page works on.
+
+    Parameters
+    ----------
+    root
+        The folder of the studies; no path outside it is opened, unless it was open before.
+    scratch
+        A folder for the output of commands.
+    """
+
+    def __init__(
+        self, root: Path, shipped: Sequence[str], offered: Sequence[OfferedCommand], scratch: Path
+    ) -> None:
+        self.root = root
+        self.scratch = scratch
+        self._shipped = shipped
+        self._offered = {each.name: each for each in offered}
+        self._document: Document | None = None
+        self._jobs: list[Job] = []
+        self._schemas: dict[Path, Any] = {}
+        self._lock = threading.RLock()
+
+    def requests(self) -> dict[str, Callable[..., Any]]:
+        """Return what the page may ask for, by name."""
+        return {
+            "studies": self.studies, "open": self.open, "copy": self.copy, "show": self.show,
+            "edit": self.edit, "splice": self.splice, "undo": self.undo, "redo": self.redo,
+            "save": self.save, "reload": self.reload, "check": self.check, "schema": self.schema,
+            "run": self.run, "job": self.job, "stop": self.stop,
+        }  # fmt: skip
+
+    @property
+    def document(self) -> Document:
+        """The study that is open.
+
+        Raises
+        ------
+        ProtocolError
+            None is.
+        """
+        if self._document is None:
+            raise ProtocolError("no study is open; open one, or copy one")
+        return self._document
+
+    def studies(self) -> dict[str, Any]:
+        """Return the studies of the folder, those opened last, the shipped ones, the commands."""
+        found = sorted(
+            path
+            for pattern in DEPTH
+            for path in self.root.glob(f"{pattern}.y*ml")
+            if path.suffix in YAML and not path.name.startswith(".") and _is_protocol(path)
+        )
+        return {
+            "root": str(self.root),
+            "here": [path.relative_to(self.root).as_posix() for path in found],
+            "recent": [str(path) for path in recent() if path.is_file()],
+            "shipped": list(self._shipped),
+            "commands": [asdict(each) for each in self._offered.values()],
+            "open": self._document is not None,
+            "jobs": [each.shown() for each in self._jobs],
+        }
+
+    def open(self, path: str) -> dict[str, Any]:
+        """Open a study of the folder, or one that was open before."""
+        wanted = (self.root / path).resolve()
+        if not wanted.is_relative_to(self.root) and wanted not in recent():
+            raise ProtocolError(
+                f"{wanted} is outside {self.root}; start labcrane with that study's folder"
+            )
+        with self._lock:
+            self._document = Document.open(wanted)
+            remember(wanted)
+            return self._document.shown()
+
+    def copy(self, shipped: str, name: str) -> dict[str, Any]:
+        """Copy a shipped study into the folder, by ``labcrane new-study``, and open it."""
+        if Path(name).name != name or name.startswith("."):
+            raise ProtocolError(f"{name!r} cannot name a folder; give a name such as my_study")
+        said = self._labcrane(["new-study", "--", shipped, name], self.root)
+        if said.returncode:
+            raise ProtocolError(said.stderr.strip().removeprefix("labcrane: "))
+        line = f"labcrane new-study {shipped} {name}"
+        return {**self.open(f"{name}/protocol.yaml"), "line": line}
+
+    def show(self) -> dict[str, Any]:
+        """Return the open study as it stands."""
+        return self.document.shown()
+
+    def edit(
+        self, revision: int, how: str, place: list[str | int], value: Any = None
+    ) -> dict[str, Any]:
+        """Change one place."""
+        with self._lock:
+            document = self.document
+            document.change(revision, edited(document.text, how, tuple(place), value))
+            return document.shown()
+
+    def splice(self, revision: int, begin: int, end: int, text: str) -> dict[str, Any]:
+        """Put ``text`` in the place of the characters from ``begin`` to ``end``."""
+        with self._lock:
+            document = self.document
+            before = document.text
+            if not 0 <= begin <= end <= len(before):
+                raise ProtocolError(f"the text has no characters {begin} to {end}")
+            document.change(revision, before[:begin] + text + before[end:])
+            return document.shown()
+
+    def undo(self, revision: int) -> dict[str, Any]:
+        """Take the last change back."""
+        with self._lock:
+            self.document.undo(revision)
+            return self.document.shown()
+
+    def redo(self, revision: int) -> dict[str, Any]:
+        """Make it again."""
+        with self._lock:
+            self.document.redo(revision)
+            return self.document.shown()
+
+    def save(
+        self, revision: int, over_newer: bool = False, over_approved: bool = False  # noqa: FBT001, FBT002 - keys of a request
+    ) -> dict[str, Any]:  # fmt: skip
+        """Write the study's file, or return the question that must be answered before."""
+        with self._lock:
+            try:
+                self.document.save(revision, over_newer=over_newer, over_approved=over_approved)
+            except (NewerFileError, ApprovedError) as error:
+                ask = "newer" if isinstance(error, NewerFileError) else "approved"
+                return {**self.document.shown(), "ask": ask}
+            return self.document.shown()
+
+    def reload(self, revision: int) -> dict[str, Any]:
+        """Take the file as it is on the disk."""
+        with self._lock:
+            self.document.reload(revision)
+            return self.document.shown()
+
+    def check(self) -> dict[str, Any]:
+        """Return what ``labcrane check`` finds in the text as it is now."""
+        with self._lock:
+            document = self.document
+            path = document.draft if document.unsaved else document.path
+            revision = document.revision
+        said = self._labcrane(["check", path.name, "--json"], path.parent)
+        try:
+            told = json.loads(said.stdout.splitlines()[-1])
+        except (IndexError, ValueError):
+            raise ProtocolError(f"labcrane check failed: {said.stderr.strip()}") from None
+        findings = [
+            {**each, "message": each["message"].replace(path.name, document.path.name)}
+            for each in told["findings"]
+        ]
+        return {"revision": revision, "fine": told["fine"], "findings": findings}
+
+    def schema(self) -> Any:
+        """Return the JSON Schema of protocols, with the plugins in the study's folder."""
+        path = self.document.path
+        if path not in self._schemas:
+            said = self._labcrane(["schema", "--study", path.name], path.parent)
+            if said.returncode:
+                said = self._labcrane(["schema"], path.parent)
+            self._schemas[path] = json.loads(said.stdout)
+        return self._schemas[path]
+
+    def run(self, command: str, given: dict[str, Any]) -> dict[str, Any]:
+        """Start a command in the study's folder."""
+        if command not in self._offered:
+            raise ProtocolError(f"the page does not offer labcrane {command!r}")
+        with self._lock:
+            number = len(self._jobs)
+            words = self._offered[command].words(given)
+            job = Job(number, words, self.document.path.parent, self.scratch / f"{number}.txt")
+            self._jobs.append(job)
+            return job.shown()
+
+    def job(self, number: int) -> dict[str, Any]:
+        """Return a command's output, and the pictures it has named."""
+        job = self._job(number)
+        shown = job.shown()
+        pictures = [
+            path.relative_to(self.document.path.parent).as_posix()
+            for path in sorted(self.document.path.parent.glob("*/*.png"))
+            if path.parent.name in shown["line"] and path.stat().st_mtime >= job.begun
+        ]
+        return {**shown, "pictures": pictures}
+
+    def stop(self, number: int) -> dict[str, Any]:
+        """Interrupt a command."""
+        self._job(number).stop()
+        return self._job(number).shown()
+
+    def picture(self, path: str) -> Path | None:
+        """Return a picture below the study's folder; None where there is none."""
+        folder = self.document.path.parent.resolve()
+        wanted = (folder / path).resolve()
+        there = wanted.is_relative_to(folder) and wanted.suffix in PICTURES and wanted.is_file()
+        return wanted if there else None
+
+    def still_running(self) -> list[str]:
+        """Return the lines of commands that have not ended."""
+        return [each.line for each in self._jobs if each.runs]
+
+    def _job(self, number: int) -> Job:
+        if not 0 <= number < len(self._jobs):
+            raise ProtocolError(f"no command has the number {number}")
+        return self._jobs[number]
+
+    @staticmethod
+    def _labcrane(words: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+        try:
+            return subprocess.run(  # noqa: S603 - labcrane itself, without a shell
+                [sys.executable, "-m", "labcrane", *words],
+                cwd=folder, capture_output=True, encoding="utf-8", check=False, timeout=PATIENCE_S,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            raise ProtocolError(
+                f"labcrane {words[0]} took longer than {PATIENCE_S:g} s; try it in a terminal"
+            ) from None
+
+
+def _is_protocol(path: Path) -> bool:
+    try:
+        return bool(OURS.search(path.read_bytes()))
+    except OSError:
+        return False  # gone, or not for this user
+
+
+def serve(
+    root: Path,
+    shipped: Sequence[str],
+    offered: Sequence[OfferedCommand],
+    port: int,
+    say: Callable[[str], None],
+) -> None:
+    """Serve the start page to this computer until it is interrupted; ``say`` receives its link."""
+    with TemporaryDirectory(prefix="labcrane-start-", ignore_cleanup_errors=True) as scratch:
+        workspace = Workspace(root, shipped, offered, Path(scratch))
+        serve_here(application(workspace), START, port, say)
+        for line in workspace.still_running():
+            say(f"still running: {line}")
+
+
+def application(workspace: Workspace) -> Any:
+    """Return the page and its requests, an ASGI application."""
+    from starlette.applications import Starlette  # noqa: PLC0415 - loads for a while
+    from starlette.concurrency import run_in_threadpool  # noqa: PLC0415
+    from starlette.responses import FileResponse, JSONResponse, PlainTextResponse  # noqa: PLC0415
+    from starlette.routing import Route  # noqa: PLC0415
+
+    requests = workspace.requests()
+    fresh = {"cache-control": "no-store"}
+
+    async def page(_: "Request") -> "Response":
+        return FileResponse(HERE / "start.html", headers=fresh)
+
+    async def asset(request: "Request") -> "Response":
+        found = ASSETS.get(request.path_params["name"])
+        if found is None:
+            return PlainTextResponse("labcrane: no such file", NOT_FOUND)
+        return FileResponse(found, headers=fresh)
+
+    async def picture(request: "Request") -> "Response":
+        found = workspace.picture(request.path_params["path"])
+        if found is None:
+            return PlainTextResponse("labcrane: no such picture", NOT_FOUND)
+        return FileResponse(found, headers=fresh, media_type=PICTURES[found.suffix])
+
+    async def ask(request: "Request") -> "Response":
+        try:
+            answers = requests[request.path_params["name"]]
+            given = signature(answers).bind(**json.loads(await request.body() or b"{}"))
+        except (KeyError, TypeError, ValueError) as error:
+            return JSONResponse({"error": f"not a request of this page: {error}"}, BAD_REQUEST)
+        try:
+            answer = await run_in_threadpool(answers, *given.args, **given.kwargs)
+        except LabcraneError as error:
+            lines = [str(error), *getattr(error, "__notes__", ())]
+            return JSONResponse({"error": "\n".join(lines)}, REFUSED, fresh)
+        except OSError as error:
+            return JSONResponse({"error": str(error)}, REFUSED, fresh)
+        return JSONResponse(json.loads(json.dumps(answer, default=str)), headers=fresh)
+
+    return Starlette(
+        routes=[
+            Route(f"/{START}", page),
+            Route("/asset/{name}", asset),
+            Route("/picture/{path:path}", picture),
+            Route("/ask/{name}", ask, methods=["POST"]),
+        ]
+    )

@@ -1,0 +1,249 @@
+"""The start page in a browser: what is clicked and typed comes to the file, and nothing is lost."""
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from faults import sessions
+from pages.looks import complaints
+from pages.room import a_browser, text
+from selenium import webdriver
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import Select
+from start.test_workspace import served
+
+pytestmark = [pytest.mark.slow]
+
+WINDOW = {"width": 1280, "height": 720, "deviceScaleFactor": 1, "mobile": False}
+WORDS = json.loads(
+    (Path(__file__).parents[2] / "labcrane" / "start" / "words.json").read_text(encoding="utf-8")
+)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
+    with a_browser(tmp_path_factory.mktemp("profile")) as browser:
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", WINDOW)
+        yield browser
+
+
+def wait_for(condition: Callable[[], object]) -> None:
+    sessions.wait_for(condition, 30.0)
+
+
+PRESS = """
+const found = document.querySelector(arguments[0]);
+found?.focus();
+found?.click();
+return Boolean(found);
+"""
+AT = """
+const places = [...document.querySelectorAll('[data-place]')];
+return places.find(e => e.dataset.place === arguments[0]);
+"""
+
+
+class Page:
+    """The page as it is used: by its words and fields, not by what is behind them."""
+
+    def __init__(self, browser: webdriver.Chrome, link: str) -> None:
+        self.browser = browser
+        browser.get(link)
+        wait_for(lambda: browser.find_elements(By.ID, "copy"))
+
+    def press(self, ident: str) -> None:
+        """Press a button once it can be; the page may replace it meanwhile."""
+        wait_for(lambda: self.browser.execute_script(PRESS, f"#{ident}:not(:disabled)"))
+
+    def at(self, *place: object) -> object:
+        wanted = json.dumps(list(place), separators=(",", ":"))
+        wait_for(lambda: self.browser.execute_script(AT, wanted))
+        return self.browser.execute_script(AT, wanted)
+
+    def write(self, value: str, *place: object) -> None:
+        self.at(*place).send_keys(Keys.CONTROL, "a")
+        self.at(*place).send_keys(value, Keys.TAB)
+
+    def yaml(self) -> str:
+        return str(self.browser.execute_script("return document.getElementById('yaml').value"))
+
+    def copied(self, name: str = "mine") -> None:
+        field = self.browser.find_element(By.ID, "name")
+        field.clear()
+        field.send_keys(name)
+        self.press("copy")
+        self.at("title")
+        self.is_fine()
+
+    def is_fine(self) -> None:
+        wait_for(lambda: text(self.browser, "checked") == "labcrane check finds nothing")
+
+
+@pytest.fixture
+def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    (tmp_path / "lab").mkdir()
+    return tmp_path / "lab"
+
+
+@pytest.fixture
+def page(lab: Path, browser: webdriver.Chrome) -> Iterator[Page]:
+    with served(lab) as (_, link):
+        yield Page(browser, link)
+
+
+def test_a_field_and_the_text_follow_each_other_and_undo_takes_both_back(
+    page: Page, lab: Path
+) -> None:
+    page.copied()
+    before = page.yaml()
+    page.write("Mine: ours", "title")
+    wait_for(lambda: 'title: "Mine: ours"' in page.yaml())
+    assert page.yaml() == before.replace(
+        "title: Aiming movements with a robotic crane", 'title: "Mine: ours"'
+    )
+    box = page.browser.find_element(By.ID, "yaml")
+    box.send_keys(Keys.CONTROL, Keys.HOME)
+    box.send_keys("# 🏗 typed\n")
+    file = lab / "mine" / "protocol.yaml"
+    assert file.read_text(encoding="utf-8") == before
+    page.press("save")
+    wait_for(lambda: file.read_text(encoding="utf-8").startswith("# 🏗 typed\n# The"))
+    while (now := page.yaml()) != before:  # typing may have come in several parts
+        page.press("undo")
+        wait_for(lambda now=now: page.yaml() != now)
+    assert page.at("title").get_attribute("value") == "Aiming movements with a robotic crane"
+    page.press("redo")
+    wait_for(lambda: 'title: "Mine: ours"' in page.yaml())
+    page.press("save")
+    wait_for(lambda: 'title: "Mine: ours"' in file.read_text(encoding="utf-8"))
+
+
+def test_a_finding_is_at_its_field_and_its_button_mends_it(page: Page) -> None:
+    page.copied()
+    before = page.yaml()
+    page.browser.execute_script(
+        "const box = document.getElementById('yaml');"
+        "box.value = box.value.replace('use: sphere', 'use: spere');"
+        "box.dispatchEvent(new Event('input'))"
+    )
+    wait_for(lambda: "did you mean 'sphere'" in text(page.browser, "findings"))
+    page.at("feedback").click()
+    field = page.at("feedback", "ball", "use")
+    assert field.get_attribute("aria-invalid") == "true"
+    [button] = page.browser.find_elements(
+        By.XPATH, "//*[@id='findings']//button[text()='Use sphere']"
+    )
+    button.click()
+    wait_for(lambda: page.yaml() == before)
+    page.is_fine()
+
+
+def test_steps_are_added_moved_and_removed_by_keyboard(page: Page) -> None:
+    page.copied()
+    before = page.yaml()
+    steps = ("sessions", 0, "steps")
+    kind = page.browser.find_element(By.CSS_SELECTOR, "#form select[aria-label='Kind of step']")
+    Select(kind).select_by_visible_text("break")
+    page.at(*steps, "add").send_keys(Keys.ENTER)
+    wait_for(lambda: "- break: {seconds: " in page.yaml())
+    lines = page.yaml().splitlines()
+    [at] = [n for n, line in enumerate(lines) if "- break:" in line]
+    assert [*lines[:at], *lines[at + 1 :]] == before.splitlines()
+    page.is_fine()
+    page.at(*steps, 1, "later").send_keys(Keys.ENTER)
+    wait_for(lambda: "break" in page.at(*steps, 2).text)
+    page.at(*steps, 2, "remove").send_keys(Keys.ENTER)
+    wait_for(lambda: page.yaml() == before)
+
+
+def test_a_newer_file_is_asked_about_and_no_answer_keeps_both(page: Page, lab: Path) -> None:
+    page.copied()
+    file = lab / "mine" / "protocol.yaml"
+    other = file.read_text(encoding="utf-8") + "# by another program\n"
+    page.at("participants").click()
+    page.write("48", "participants", "planned")
+    wait_for(lambda: "planned: 48" in page.yaml())
+    file.write_text(other, encoding="utf-8")
+    wait_for(lambda: "changed by another program" in text(page.browser, "state"))
+    page.press("save")
+    page.press("question[open] #keep")
+    assert file.read_text(encoding="utf-8") == other
+    assert "planned: 48" in page.yaml()
+    page.press("save")
+    page.press("question[open] #reload")
+    wait_for(lambda: page.yaml() == other)
+    page.press("undo")
+    wait_for(lambda: "planned: 48" in page.yaml())
+    file.with_name("protocol.lock.json").write_text("{}", encoding="utf-8")
+    page.press("save")
+    wait_for(lambda: "labcrane amend" in text(page.browser, "question"))
+    page.press("question[open] #over")
+    wait_for(lambda: "planned: 48" in file.read_text(encoding="utf-8"))
+
+
+def test_a_server_that_is_killed_is_reported_and_the_next_one_has_the_text(
+    lab: Path, browser: webdriver.Chrome
+) -> None:
+    with served(lab) as (server, link):
+        page = Page(browser, link)
+        page.copied()
+        page.write("Kept", "title")
+        wait_for(lambda: "title: Kept" in page.yaml())
+        server.kill()
+        wait_for(lambda: "does not answer" in text(browser, "alert"))
+        assert "title: Kept" in page.yaml()
+    with served(lab) as (_, link):
+        page = Page(browser, link)
+        browser.find_element(By.XPATH, "//button[text()='mine/protocol.yaml']").click()
+        assert page.at("title").get_attribute("value") == "Kept"
+        assert "your unsaved text is back" in text(browser, "state")
+
+
+def test_a_command_runs_with_its_line_its_output_and_a_stop(page: Page) -> None:
+    page.copied()
+    page.press("tab-do")
+    wait_for(lambda: page.browser.find_elements(By.CSS_SELECTOR, "[data-place=plan]"))
+    page.browser.find_element(By.CSS_SELECTOR, "[data-place=plan]").click()
+    wait_for(lambda: "labcrane plan" in page.browser.find_element(By.ID, "main").text)
+    page.press("start")
+    wait_for(lambda: "balanced" in text(page.browser, "log"))
+    assert text(page.browser, "command") == "labcrane plan protocol.yaml"
+    assert not complaints(page.browser)
+    page.browser.find_element(By.CSS_SELECTOR, "[data-place=study]").click()
+    wait_for(lambda: "labcrane study" in page.browser.find_element(By.ID, "main").text)
+    page.press("start")
+    wait_for(lambda: page.browser.find_elements(By.CSS_SELECTOR, "#links a"))
+    page.press("stop")
+    wait_for(lambda: text(page.browser, "status") not in {"Running", ""})
+
+
+@pytest.mark.parametrize("language", ["en", "de", "pl", "fr", "es"])
+def test_the_page_can_be_used_by_everybody_in_each_language(page: Page, language: str) -> None:
+    Select(page.browser.find_element(By.ID, "language")).select_by_visible_text(
+        WORDS[language]["own"]
+    )
+    wait_for(lambda: text(page.browser, "copy") == WORDS[language]["copy"])
+    assert complaints(page.browser) == []
+    page.press("copy")
+    page.at("title")
+    for section in page.browser.find_elements(By.CSS_SELECTOR, "details:not([open]) > summary"):
+        section.click()
+    assert complaints(page.browser) == []
+    shown = page.browser.find_element(By.TAG_NAME, "body").text
+    assert "undefined" not in shown
+    assert page.browser.execute_script("return document.documentElement.lang") == language
+    wide = "return document.documentElement.scrollWidth <= innerWidth"
+    assert page.browser.execute_script(wide), "nothing is beyond the window"
+    page.press("tab-do")
+    wait_for(lambda: page.browser.find_elements(By.ID, "start"))
+    assert complaints(page.browser) == []
+
+
+def test_every_language_has_all_words() -> None:
+    assert {tuple(words) for words in WORDS.values()} == {tuple(WORDS["en"])}
+    for words in WORDS.values():
+        for name, word in words.items():
+            assert word.count("{") == WORDS["en"][name].count("{"), (name, word)

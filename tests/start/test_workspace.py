@@ -1,0 +1,240 @@
+"""What the start page may ask for, over its door: paths, findings, commands, and a kill."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.client import HTTPConnection
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+
+from labcrane.cli.offered import OFFERED, offered
+from labcrane.cli.shipped import new_study
+from labcrane.errors import ProtocolError
+from labcrane.start.jobs import Option
+from labcrane.start.service import Workspace
+
+
+@pytest.fixture(autouse=True)
+def _own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "state"))
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    lab, scratch = tmp_path / "lab", tmp_path / "scratch"
+    lab.mkdir()
+    scratch.mkdir()
+    new_study("aiming", lab / "mine")
+    return Workspace(lab, ["aiming"], list(offered()), scratch)
+
+
+def ended(workspace: Workspace, number: int) -> dict[str, Any]:
+    for _ in range(1200):
+        if (told := workspace.job(number))["status"] is not None:
+            return told
+        time.sleep(0.1)
+    raise AssertionError("the command does not end")
+
+
+def test_only_studies_below_the_folder_or_opened_before_are_opened(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    assert workspace.studies()["here"] == ["mine/protocol.yaml"]
+    outside = new_study("crossover", tmp_path / "elsewhere")
+    for path in (str(outside), "../elsewhere/protocol.yaml"):
+        with pytest.raises(ProtocolError, match="is outside"):
+            workspace.open(path)
+    (workspace.root / "link").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(ProtocolError, match="is outside"):
+        workspace.open("link/protocol.yaml")
+    Workspace(tmp_path / "elsewhere", [], [], tmp_path).open("protocol.yaml")
+    assert workspace.open(str(outside))["path"] == str(outside), "opened before"
+    assert workspace.studies()["recent"] == [str(outside)]
+
+
+def test_pictures_are_only_those_below_the_study(workspace: Workspace) -> None:
+    workspace.open("mine/protocol.yaml")
+    folder = workspace.root / "mine"
+    (folder / "seen").mkdir()
+    for path in (folder / "seen" / "a.png", workspace.root / "b.png"):
+        path.write_bytes(b"png")
+    assert workspace.picture("seen/a.png") == folder / "seen" / "a.png"
+    for path in ("../b.png", "protocol.yaml", "seen/c.png", "/etc/hostname"):
+        assert workspace.picture(path) is None
+
+
+@pytest.mark.slow
+def test_the_text_is_checked_as_it_is_typed_and_the_finding_has_its_place(
+    workspace: Workspace,
+) -> None:
+    told = workspace.open("mine/protocol.yaml")
+    assert workspace.check() == {"revision": 0, "fine": True, "findings": []}
+    at = told["text"].index("use: sphere")
+    told = workspace.splice(0, at, at + len("use: sphere"), "use: spere")
+    [finding] = workspace.check()["findings"]
+    assert "did you mean 'sphere'" in finding["message"]
+    lines = told["text"].splitlines()
+    assert "use: spere" in lines[finding["line"] - 1]
+    assert (["feedback", "ball", "use"], finding["line"]) in [each[:2] for each in told["places"]]
+    assert "spere" not in (workspace.root / "mine" / "protocol.yaml").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_a_copy_is_made_by_the_command_and_a_taken_name_is_refused(workspace: Workspace) -> None:
+    made = workspace.copy("aiming", "second")
+    assert made["path"] == str(workspace.root / "second" / "protocol.yaml")
+    assert made["data"]["study"] == "second"
+    assert made["line"] == "labcrane new-study aiming second"
+    with pytest.raises(ProtocolError, match="exists already"):
+        workspace.copy("aiming", "second")
+    for name in ("../out", ".hidden", "a/b"):
+        with pytest.raises(ProtocolError, match="cannot name a folder"):
+            workspace.copy("aiming", name)
+
+
+def test_the_options_of_commands_are_those_that_their_help_lists(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    from labcrane.cli.app import main
+
+    found = {each.name: each for each in offered()}
+    assert tuple(found) == OFFERED
+    for name in ("run", "export", "simulate"):
+        main([name, "--help"])
+        told = capsys.readouterr().out
+        for option in found[name].options:
+            assert option.flag in told, (name, option)
+    assert [each.flag for each in found["export"].options if each.required] == ["--to", "--out"]
+
+
+def test_values_become_words_of_a_command_line_and_never_other_options() -> None:
+    found = {each.name: each for each in offered()}
+    run = found["run"]
+    assert run.words({"protocol": "p.yaml", "participant": "P001", "page": False}) == [
+        "run", "--participant=P001", "--no-page", "p.yaml",
+    ]  # fmt: skip
+    assert run.words({"protocol": "--help", "participant": "--fast"}) == [
+        "run", "--participant=--fast", "--", "--help",
+    ]  # fmt: skip
+    given = {"to": "zip", "folder": "o", "include": "pilot simulated"}
+    assert found["export"].words(given)[1:] == [
+        "--to=zip", "--out=o", "--include=pilot", "--include=simulated",
+    ]  # fmt: skip
+    with pytest.raises(ProtocolError, match="needs --participant"):
+        run.words({})
+    with pytest.raises(ProtocolError, match="no option 'shell'"):
+        run.words({"participant": "P001", "shell": "x"})
+    assert isinstance(run.options[0], Option)
+
+
+@pytest.mark.slow
+def test_a_command_prints_its_line_and_its_output(workspace: Workspace) -> None:
+    workspace.open("mine/protocol.yaml")
+    workspace.run("plan", {"protocol": "protocol.yaml", "participants": "2"})
+    told = ended(workspace, 0)
+    assert (told["status"], told["line"]) == (0, "labcrane plan --participants=2 protocol.yaml")
+    assert "P002: slot 2" in told["output"]
+    with pytest.raises(ProtocolError, match="does not offer"):
+        workspace.run("erase", {})
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows stops by another signal")
+def test_stopping_is_stopping_the_command(workspace: Workspace) -> None:
+    workspace.open("mine/protocol.yaml")
+    workspace.run("simulate", {"protocol": "protocol.yaml", "folder": "sim", "participants": "500"})
+    for _ in range(600):
+        if (workspace.root / "mine" / "sim").exists():
+            break
+        time.sleep(0.1)
+    workspace.stop(0)
+    assert ended(workspace, 0)["status"] not in (0, None)
+    assert workspace.still_running() == []
+
+
+@contextmanager
+def served(lab: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    words = [sys.executable, "-m", "labcrane", "start", str(lab), "--no-browser"]
+    server = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=os.environ)
+    try:
+        yield server, next(x for x in server.stdout if x.startswith("start: ")).split()[1]
+    finally:
+        server.kill()
+        server.wait(60)
+        server.stdout.close()
+
+
+class Browser:
+    """As much of a browser as the door asks for."""
+
+    def __init__(self, link: str) -> None:
+        self.place = urlsplit(link)
+        status, headers, _ = self.get(f"/start?{self.place.query}")
+        assert status == 303
+        self.cookie = headers["set-cookie"].split(";")[0]
+
+    def get(self, path: str, method: str = "GET", body: str = "", **headers: str) -> Any:
+        connection = HTTPConnection(self.place.hostname, self.place.port, timeout=120)
+        if hasattr(self, "cookie"):
+            headers.setdefault("Cookie", self.cookie)
+        connection.request(method, path, body, headers)
+        answer = connection.getresponse()
+        told = answer.status, dict(answer.headers), answer.read().decode()
+        connection.close()
+        return told
+
+    def ask(self, name: str, **given: Any) -> Any:
+        status, _, told = self.get(f"/ask/{name}", "POST", json.dumps(given))
+        assert status == 200, told
+        return json.loads(told)
+
+
+@pytest.mark.slow
+def test_the_door_lets_in_one_browser_of_this_computer_and_no_other_page(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    with served(workspace.root) as (_, link):
+        browser = Browser(link)
+        assert browser.get("/start")[0] == 200
+        assert "set-cookie" not in browser.get(f"/start?{browser.place.query}", Cookie="")[1]
+        for path in ("/start", "/ask/studies", "/asset/start.js", "/picture/a.png"):
+            assert browser.get(path, Cookie="")[0] == 403, path
+        assert browser.get("/start", Host="evil.example")[0] == 421
+        assert browser.get("/ask/studies", "POST", "{}", Origin="http://evil.example")[0] == 403
+        assert browser.get("/ask/studies", "GET")[0] == 405
+        assert browser.get("/asset/service.py")[0] == 404
+        assert browser.get("/ask/open", "POST", '{"path": "../../x.yaml"}')[0] == 409
+        for name, body in (("nix", "{}"), ("open", "{}"), ("open", "[1]"), ("open", "{")):
+            assert browser.get(f"/ask/{name}", "POST", body)[0] == 400, (name, body)
+
+
+@pytest.mark.slow
+def test_a_server_that_is_killed_has_lost_nothing_that_was_sent(workspace: Workspace) -> None:
+    file = workspace.root / "mine" / "protocol.yaml"
+    before = file.read_text(encoding="utf-8")
+    with served(workspace.root) as (server, link):
+        browser = Browser(link)
+        browser.ask("open", path="mine/protocol.yaml")
+        browser.ask("edit", revision=0, how="set", place=["participants", "planned"], value=48)
+        server.send_signal(signal.SIGTERM if sys.platform == "win32" else signal.SIGKILL)
+        server.wait(60)
+    file.write_text("# by another program\n" + before, encoding="utf-8")
+    with served(workspace.root) as (_, link):
+        browser = Browser(link)
+        told = browser.ask("open", path="mine/protocol.yaml")
+        assert (told["data"]["participants"]["planned"], told["restored"]) == (48, True)
+        assert told["newer"]
+        assert browser.ask("save", revision=0)["ask"] == "newer"
+        assert file.read_text(encoding="utf-8").startswith("# by another program")
+        told = browser.ask("save", revision=0, over_newer=True)
+        assert not told["unsaved"]
+    assert file.read_text(encoding="utf-8") == before.replace("planned: 36", "planned: 48")
