@@ -92,7 +92,7 @@ def test_a_field_of_a_random_protocol_changes_alone(seed: int) -> None:
     data = read(text)
     place = rng.choice(scalars(data))
     value = rng.choice(VALUES)
-    if place[-2:-1] == ("scenes",) and "scenes: *scenes" in text:  # two keys have one list, by an anchor
+    if place[-2:-1] == ("scenes",) and "scenes: *scenes" in text:  # one list, by an anchor
         with pytest.raises(ProtocolError, match="cannot be changed alone"):
             edited(text, "set", place, value)
         return
