@@ -225,51 +225,6 @@ def test_no_two_public_classes_have_one_name() -> None:
     assert {name: places for name, places in found.items() if len(places) > 1} == {}
 
 
-ARTICLES = re.compile("(the|this|an?)_[a-z]{2}")
-
-
-@pytest.mark.slow
-def test_no_name_is_told_from_another_by_an_article() -> None:
-    named = set()
-    for folder in ("labcrane", "plugins"):
-        for module in (ROOT / folder).rglob("*.py"):
-            if "templates" in module.parts:
-                continue
-            for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
-                for field in ("name", "id", "arg", "attr"):
-                    name = getattr(node, field, None)
-                    if isinstance(name, str) and ARTICLES.match(name):
-                        named.add(f"{module.relative_to(ROOT)}: {name}")
-    assert named == set()
-
-
-RIDDLES = {
-    "asking", "brisk", "course", "crew", "culprit", "desk", "heed", "hurried", "inquiry", "keeper",
-    "onlooker", "onlookers", "stillness", "whereabout", "whereabouts",
-}  # fmt: skip
-"""Words of our own for what has a name elsewhere: sequencer, handle, marker, inventory ..."""
-
-
-@pytest.mark.slow
-def test_no_name_is_a_riddle() -> None:
-    named = set()
-    for folder in ("labcrane", "plugins"):
-        for module in (ROOT / folder).rglob("*.py"):
-            names = {module.stem} | {
-                name
-                for node in ast.walk(ast.parse(module.read_text(encoding="utf-8")))
-                for field in ("name", "id", "arg", "attr")
-                if isinstance(name := getattr(node, field, None), str)
-            }
-            words = {name: re.findall("[a-z]+|[A-Z][a-z]*", name) for name in names}
-            named |= {
-                f"{module.relative_to(ROOT)}: {name}"
-                for name, parts in words.items()
-                if RIDDLES & {part.lower() for part in parts}
-            }
-    assert named == set()
-
-
 def test_no_import_goes_round_in_a_circle() -> None:
     graph = grimp.build_graph("labcrane")
     order = TopologicalSorter(

@@ -60,12 +60,3 @@ def test_a_sentence_of_36_words_is_found(text: str) -> None:
 )
 def test_tables_code_and_headings_are_not_sentences(text: str) -> None:
     assert count.long_sentences(text) == []
-
-
-def test_the_report_names_each_long_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(count, "pages", lambda: [ROOT / "README.md"])
-    monkeypatch.setattr(count, "LONGEST_SENTENCE", 5)
-    said = count.report()
-    assert f"README.md: {count.words(ROOT / 'README.md')} words\n" in said
-    assert "\nsentences over 5 words: " in said
-    assert "\n  README.md: " in said
