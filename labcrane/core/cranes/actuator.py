@@ -38,8 +38,8 @@ class Actuator:
 
     def reset(self) -> None:
         """Forget every command: the joints are at rest."""
-        self.numbers = [0.0] * (self.joints * (1 + self.delay))
-        """State, also of a compiled kernel: speeds, then delayed commands, in rad/s."""
+        self.numbers = [0.0] * (self.joints * (1 + self.delay) + 1)
+        """State, also of a compiled kernel (:func:`labcrane.core.cranes.law.lag`)."""
 
     def follow(self, command: Sequence[float]) -> Sequence[float]:
         """Return the joint speeds in rad/s that a tick with this command leads to."""

@@ -147,7 +147,7 @@ class Crane(Dynamics):
             actuator.share, 0.0,
         )  # fmt: skip
         lengths, offsets = zip(*((joint.a, joint.offset) for joint in joints), strict=True)
-        moving = [0.0] * (len(joints) * (3 + actuator.delay))
+        moving = [0.0] * (2 * len(joints) + len(actuator.numbers))
         tables = (*actuator.most, *self._lowest, *self._highest, *lengths, *offsets)
         own = np.array([*head, *tables, *further, *moving])
         return Kernel(

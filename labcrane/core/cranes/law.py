@@ -23,18 +23,22 @@ JOINTS, DELAY, DT, BASE_X, HEIGHT, DRIVE, CHANGES, IDEAL, SHARE = range(9)
 begins; then the actuator's constants. Rows of :data:`TABLES` follow."""
 TABLES = 10
 """Where the largest changes are, then lowest and highest angles, lengths and offsets. What changes
-comes behind them: angles, speeds, the actuator's speeds and commands on their way."""
+comes behind them: angles, speeds and the actuator's state (:func:`lag`)."""
 
 
 def lag(moving: MutableNumbers, command: Numbers, delay: int, share: float, most: Numbers) -> None:
-    """Change an actuator's speeds, and behind them the commands on their way, by a command."""
+    """Change an actuator's speeds by a command.
+
+    Behind the speeds are the commands on their way, as a ring, and which of them is due.
+    """
     n = len(command)
+    due = n + n * int(moving[-1])
     for j in range(n):
-        change = share * ((moving[n + j] if delay > 0 else command[j]) - moving[j])
+        change = share * ((moving[due + j] if delay > 0 else command[j]) - moving[j])
         moving[j] += most[j] if change > most[j] else (-most[j] if change < -most[j] else change)
     if delay > 0:
-        moving[n : n * delay] = moving[2 * n :]
-        moving[n * delay :] = command
+        moving[due : due + n] = command
+        moving[-1] = (moving[-1] + 1.0) % delay
 
 
 def follow(own: FloatArray, at: int, command: FloatArray, speeds: FloatArray) -> None:
