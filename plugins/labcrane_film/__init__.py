@@ -1,6 +1,10 @@
 """Cameras, microphones and screens, recorded by PyAV into Matroska files."""
 
+from collections.abc import Sequence
+
 from labcrane import Capture, Machine, Offer, hookimpl, offer
+from labcrane.core import Finding
+from labcrane.registry import Prompt
 from labcrane_film.settings import (
     FilmCameraSettings,
     MicrophoneSettings,
@@ -21,8 +25,14 @@ def labcrane_captures() -> list[Offer[Capture]]:
         del machine  # the same for every machine
         return FilmedSource(settings)
 
+    def examine(settings: SourceSettings, ask: Prompt | None) -> Sequence[Finding]:
+        from labcrane_film.film import examine
+
+        del ask  # nothing needs to be moved
+        return examine(settings)
+
     return [
-        offer("camera", FilmCameraSettings, build, needs=NEEDS),
-        offer("microphone", MicrophoneSettings, build, needs=NEEDS),
-        offer("screen", ScreenSettings, build, needs=NEEDS),
+        offer("camera", FilmCameraSettings, build, examine, needs=NEEDS),
+        offer("microphone", MicrophoneSettings, build, examine, needs=NEEDS),
+        offer("screen", ScreenSettings, build, examine, needs=NEEDS),
     ]

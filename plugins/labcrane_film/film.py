@@ -13,12 +13,15 @@ from typing import Any
 import av
 
 from labcrane import Capture, DeviceError
-from labcrane.core import Captured
+from labcrane.core import Captured, Finding, Verdict
 from labcrane_film.settings import SourceSettings
 from labcrane_film.stamps import ArrivalSpread, StampClock
 
 MS = Fraction(1, 1000)
 """Matroska's unit of time."""
+
+ERRORS = (av.error.FFmpegError, OSError, ValueError)
+"""What FFmpeg and the disk raise."""
 
 RAW = frozenset({"rawvideo", "wrapped_avframe", "v210", "bitpacked"})
 """Codecs of pictures that are not compressed."""
@@ -26,6 +29,9 @@ RAW = frozenset({"rawvideo", "wrapped_avframe", "v210", "bitpacked"})
 OPEN_S, READ_S = 20.0, 5.0
 CLUSTER = {"cluster_time_limit": "1000", "flush_packets": "1"}
 """What is in the file survives any kill: a second at a time goes to the disk."""
+
+LOOKED_AT = 20
+"""So many frames an examination reads."""
 
 DROPPED = 1.5
 """From so many periods between two stamps on, frames are missing between them."""
@@ -53,7 +59,7 @@ class FilmedSource(Capture):
                 timeout=(OPEN_S, READ_S),
             )
             self._stream = getattr(self._input.streams, settings.kind)[0]
-        except (OSError, ValueError, IndexError) as error:  # av's errors are of these classes
+        except (*ERRORS, IndexError) as error:
             raise DeviceError(
                 f"{self._called} cannot be opened: {error}; plug it in, close other programs that "
                 "use it, and correct its settings in the protocol"
@@ -74,7 +80,8 @@ class FilmedSource(Capture):
             if self._file is None:
                 self._file = _File(self._path, self._stream, self._settings.codec)
             return self._file.write(packet, *self._timed(packet, arrival))
-        except (OSError, ValueError) as error:
+        except ERRORS as error:
+            self._drop()  # what waits for the disk is lost, and was not returned
             raise DeviceError(
                 f"{self._path} cannot be written: {error}; make room on the disk of the data folder"
             ) from error
@@ -83,14 +90,34 @@ class FilmedSource(Capture):
         file, self._file = self._file, None
         try:
             return file.close() if file else ()
-        except (OSError, ValueError) as error:
+        except ERRORS as error:
             raise DeviceError(f"the end of {self._path} was not written: {error}") from error
 
     def close(self) -> None:
-        if self._file is not None:
-            self._file.drop()
+        self._drop()
         if self._input is not None:
             self._input.close()
+
+    def _drop(self) -> None:
+        file, self._file = self._file, None
+        if file is not None:
+            file.drop()
+
+    def look(self) -> Finding:
+        """Return what the open device sends, from some of its frames."""
+        frames = [self._timed(*self._next()) for _ in range(LOOKED_AT)]
+        source = self._stream.codec_context
+        text = f"{self._called} sends {source.name}"
+        if self._settings.kind == "video":
+            done = f"encoded by {self._settings.codec}" if _is_raw(self._stream) else "copied"
+            text += f", {source.width} x {source.height}, {1 / (frames[-1][0] or math.nan):.1f} a "
+            text += f"second, which is {done}"
+        uncertain = max(frame.clock + frame.arrival for _, frame in frames)
+        text += f"; times may be off by {1e3 * uncertain:.1f} ms, beside the device's lag"
+        if self._clock.known:
+            return Finding(Verdict.PASS, text)
+        text += ", for its timestamps are of an unknown clock and the arrival is used"
+        return Finding(Verdict.WARN, text, "use another driver or device if milliseconds matter")
 
     @property
     def _called(self) -> str:
@@ -100,7 +127,7 @@ class FilmedSource(Capture):
         """Return the next frame and when it came."""
         try:
             packet = next(self._packets)
-        except (OSError, ValueError, StopIteration) as error:
+        except (*ERRORS, StopIteration) as error:
             raise DeviceError(f"{self._called} sends no more: {error}; plug it in") from error
         arrival = time.perf_counter()
         if not packet.size or packet.pts is None:
@@ -122,6 +149,18 @@ class FilmedSource(Capture):
             spread = 0.0
         lag = math.nan if settings.lag_s is None else settings.lag_error_s
         return period, Captured(0, stamp, moment - (settings.lag_s or 0.0), clock, spread, lag)
+
+
+def examine(settings: SourceSettings) -> list[Finding]:
+    """Open a device as a session would, and read some of its frames."""
+    source = FilmedSource(settings)
+    try:
+        source.begin()
+        return [source.look()]
+    except DeviceError as error:
+        return [Finding.failed(error)]
+    finally:
+        source.close()
 
 
 class _File:

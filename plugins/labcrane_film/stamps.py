@@ -22,6 +22,11 @@ class StampClock:
         self._clock: Callable[[], float] | None = None
         self._offset = 0.0
 
+    @property
+    def known(self) -> bool:
+        """Whether it was recognised."""
+        return self._clock is not None
+
     def time_of(self, stamp: float, arrival: float) -> tuple[float, float] | None:
         """Return when a stamp was on the session's clock, and the uncertainty, in seconds.
 

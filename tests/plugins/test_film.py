@@ -10,11 +10,11 @@ from pathlib import Path
 import av
 import pytest
 
-from labcrane import Capture, DeviceError
-from labcrane.core import Captured
-from labcrane.testing import CaptureContract
-from labcrane_film import stamps
-from labcrane_film.film import FilmedSource
+from labcrane import Capture, DeviceError, Offer, Settings
+from labcrane.core import Captured, Finding, Verdict
+from labcrane.testing import CaptureContract, ExaminationContract
+from labcrane_film import labcrane_captures, stamps
+from labcrane_film.film import FilmedSource, examine
 from labcrane_film.settings import FilmCameraSettings, MicrophoneSettings, SourceSettings
 
 CLOCKED = "settb=1/1000000,realtime,setpts=RTCTIME"
@@ -53,6 +53,32 @@ class TestMicrophone(CaptureContract):
     @pytest.fixture
     def capture(self) -> Capture:
         return microphone()
+
+
+@pytest.mark.slow
+class TestExamination(ExaminationContract):
+    """It is that of all three."""
+
+    @pytest.fixture
+    def offered(self) -> Offer[Capture]:
+        return labcrane_captures()[0]
+
+    @pytest.fixture(params=[CLOCKED, "realtime", "no filter"])
+    def settings(self, request: pytest.FixtureRequest) -> Settings:
+        device = f"testsrc2=size=160x120:rate=30,{request.param}"
+        return FilmCameraSettings(device=device, format="lavfi", consent="we film")
+
+
+@pytest.mark.slow
+def test_an_examination_tells_a_device_with_timestamps_from_one_without() -> None:
+    def found(filters: str) -> Finding:
+        device = f"testsrc2=size=160x120:rate=30,{filters}"
+        return examine(FilmCameraSettings(device=device, format="lavfi", consent="we film"))[0]
+
+    assert found(CLOCKED).verdict is Verdict.PASS
+    assert "160 x 120, 30.0 a second, which is encoded by libx264" in found(CLOCKED).text
+    assert found("realtime").verdict is Verdict.WARN
+    assert found("no filter").verdict is Verdict.FAIL
 
 
 def frames_in(path: Path) -> list[float]:
