@@ -8,6 +8,8 @@ import numpy as np
 import psutil
 import pytest
 from faults.sessions import labcrane, session_process, wait_for
+from needs import needs
+from recording.test_full_disk import in_namespace
 from simple_crane import CRANE
 
 from labcrane import open_recording
@@ -126,3 +128,40 @@ def test_a_session_that_is_killed_and_resumed_is_filmed_in_both_parts(tmp_path: 
     assert resumed.returncode == 0, said
     for name in ("face", "room"):
         check_files(folder, name, files=2)
+
+
+FILLED = """
+import sys
+import time
+from pathlib import Path
+from faults.sessions import labcrane, wait_for
+from faults.test_filmed_session import STUDY, WHO, check_files, size
+
+disk = Path(sys.argv[1])
+protocol, ballast, folder = disk / "study.yaml", disk / "ballast", disk / "P001-SIMULATED"
+protocol.write_text(STUDY)
+launcher = labcrane("run", protocol, *WHO, disk)
+wait_for(lambda: size(folder / "ses-01_run.xdf") > 300_000)
+with ballast.open("wb", buffering=0) as file:
+    try:
+        while file.write(bytes(4096)):
+            pass
+    except OSError:
+        pass
+time.sleep(4.0)  # the disk is full for so long, whatever else goes on
+ballast.unlink()
+said = launcher.communicate(timeout=240)[0]
+assert launcher.returncode == 0, said
+assert "ses-01_face.mkv cannot be written: " in said, said
+assert "No space left on device" in said, said
+assert "recording face: is written to ses-01_face.2.mkv" in said, said
+check_files(folder, "face", files=2)
+print("recorded again")
+"""
+
+
+@needs("mounts")
+@pytest.mark.slow
+def test_a_full_disk_ends_a_file_and_the_next_begins_when_there_is_room(tmp_path: Path) -> None:
+    done = in_namespace("size=64m", FILLED, tmp_path)
+    assert done.stdout == "recorded again\n", done.stdout + done.stderr

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from faults.sessions import labcrane
 from governance.kept_people import REASON, check_erased, copied, files, store_of
 from governed import GOVERNED, TODAY, Lab, edit
 
@@ -74,6 +75,18 @@ def test_relabelling_moves_films_with_their_participant(lab: Lab) -> None:
         assert not (root / "P007").exists()
         for file in ("ses-01_face.mkv", "ses-01_face.2.mkv"):
             assert (root / "P008" / file).read_bytes() == made[f"P007/{file}"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("exporter", ["bids", "matlab", "tables", "xdf"])
+def test_no_export_contains_a_film(lab: Lab, tmp_path: Path, exporter: str) -> None:
+    filmed(lab)
+    out = tmp_path / "out"
+    done = labcrane("export", lab.places.root, "--to", exporter, "--out", out)
+    assert done.communicate()[0].endswith(f"{exporter}: {out}\n")
+    made = [path for path in out.rglob("*") if path.is_file()]
+    assert made
+    assert not [path for path in made if b"face of " in path.read_bytes()]
 
 
 def test_where_lists_the_folder_with_the_films(lab: Lab) -> None:
