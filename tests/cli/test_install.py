@@ -166,3 +166,22 @@ def test_a_lean_installation_does_its_part_and_names_the_extra_for_the_rest(
     refused = labcrane_command("report", tmp_path / "data", "--include", "simulated")
     assert f"which is not installed: {extra}" in refused.stderr
     assert "Traceback" not in refused.stderr
+
+
+def test_a_camera_without_its_library_is_named_with_its_line_and_the_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
+    path = study(tmp_path)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    lines.append("recordings: {face: {use: camera, device: /dev/video0, consent: we film}}")
+    path.write_text("\n".join(lines), encoding="utf-8")
+    chosen = load(path, discover(), recorded=True)
+    with pytest.raises(labcrane.ProtocolError) as refused:
+        chosen.check_installed(simulated=True)
+    at = f"{path}:{len(lines)}:"
+    assert str(refused.value).startswith(at)
+    assert str(refused.value).endswith(
+        "capture 'camera' needs av, which is not installed: pip install 'labcrane[video]'"
+    )
+    chosen.check_installed(simulated=True, feedback=False)  # nothing is filmed as fast as it goes

@@ -19,7 +19,7 @@ import labcrane
 ROOT = Path(__file__).parents[2]
 PLUGINS = sorted(path for path in (ROOT / "plugins").iterdir() if (path / "__init__.py").exists())
 HEAVY = {
-    "mujoco", "pybullet", "pygame", "pyo", "panda3d", "pandas", "h5py", "nicegui", "pylsl",
+    "av", "mujoco", "pybullet", "pygame", "pyo", "panda3d", "pandas", "h5py", "nicegui", "pylsl",
     "matplotlib", "pint",
 }  # fmt: skip
 AIMING = str(ROOT / "protocols" / "aiming" / "protocol.yaml")
