@@ -368,3 +368,24 @@ def test_chunks_computed_back_by_a_wrong_rate_state_the_half_that_it_leaves_out(
     # How long each waits on the mean is a constant lag, which no stamp shows.
     off = np.abs(corrected.time - t - np.mean(sent - known))
     assert np.mean(off <= corrected.error) >= 0.95
+
+
+@pytest.mark.parametrize("way", ["fades", "grows", "a quartz that warms up"])
+@pytest.mark.parametrize("seed", range(8))
+def test_a_delay_that_fades_or_grows_by_and_by_is_stated(seed: int, way: str) -> None:
+    """At the start of a session 42 to 87 ms off where 0.2 were stated."""
+    random = np.random.default_rng([11, seed, *way.encode()])
+    rate, seconds = float(random.choice([60.0, 120.0, 250.0, 500.0])), random.uniform(200.0, 400.0)
+    t = 1.0 + np.arange(int(rate * seconds)) / (rate * (1.0 + random.uniform(-5e-5, 5e-5)))
+    past = t[-1] - t if way == "grows" else t
+    by = 1e-4 if way.startswith("a quartz") else random.uniform(0.01, 0.09)
+    fades = by * np.exp(-past / random.uniform(3.0, 25.0))
+    if way.startswith("a quartz"):
+        t, fades = t + fades, 0.0
+    clock = some_clock(random)
+    corrected = correct(clock(t + fades), probes=clock.probes(random, t[-1]), rate_hz=rate)
+    off, uneven_off = np.abs(corrected.time - t), np.abs(corrected.uneven - t)
+    assert np.quantile(off, 0.95) <= np.quantile(uneven_off, 0.95) + 1e-4
+    assert np.mean(off <= corrected.error) >= 0.95
+    if way.startswith("a quartz"):
+        assert corrected.error.max() < 5e-4

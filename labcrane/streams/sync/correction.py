@@ -302,7 +302,7 @@ def _evened(
         part = slice(segment.start, segment.stop)
         # Nothing tells cut stamps from rounded ones, and so whether they are half a unit early.
         error[part] += sampling.grid_s / 2.0 + sampling.back_s + sampling.kept_s
-        error[part] += sampling.unsure_s
+        error[part] += sampling.unsure_s + sampling.wander_s
         if not declared:  # a mean that is known holds for the middle of a chunk
             error[part] += sampling.chunk_s
         if not treatment.can_drop_samples:  # nothing else tells uneven samples from late stamps

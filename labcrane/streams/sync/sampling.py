@@ -36,6 +36,12 @@ EARLIER = 0.1
 """At least this part of chunks stamped when sent waited for less than the one before."""
 
 RATE_CHANGE = 1e-3
+QUARTZ, HARDLY_A_DELAY = 1e-4, 1e-2
+"""A quartz that warms up changes its rate by less than the first. A delay that fades or grows looks
+like a change; by more than the second, samplers change their own rate, as cameras in the dark do.
+"""
+
+QUARTZ_S = 10.0
 LEAST_NOISE_S = 5e-5
 WITHIN = 0.75
 """Stamps on a grid scatter by half of its unit; what scatters by more was not taken evenly."""
@@ -111,6 +117,9 @@ class Sampling:
     chunk_s
         By how much the middle of a chunk may be beside the sample that its stamps rest on, which
         may be the first or the last: the steps within a chunk are shorter than its samples take.
+    wander_s
+        By how much stamps stray from an even count, shape ``(n,)``: the rate changed by more than a
+        quartz does, or a delay, by and by; nothing tells which.
     back_s
         By how much the clock of an irregular stream without arrivals may have been set back.
     behind
@@ -144,6 +153,7 @@ class Sampling:
     slip_s: float = 0.0
     shift_s: float = 0.0
     chunk_s: float = 0.0
+    wander_s: FloatArray | float = 0.0
     behind: int = 0
 
     @property
@@ -279,6 +289,7 @@ def examine(
         slip_s=found.period if found.slips else 0.0,
         shift_s=receipt.open_shift(found.flowed, found.index) if late else 0.0,
         chunk_s=found.chunk_s,
+        wander_s=_wander(found) if found.exact and not disordered else 0.0,
     )
 
 
@@ -495,6 +506,23 @@ def _rates(found: _Steps) -> tuple[float, ...]:
     if found.exact or abs(ends[1] - ends[0]) > RATE_CHANGE * mean:
         return 1.0 / ends[0], 1.0 / ends[1]
     return ()
+
+
+def _wander(found: _Steps) -> FloatArray | float:
+    """Return how far stamps stray from an even count, where their rate changes as no quartz's."""
+    rest = found.flowed - found.period * found.index
+    count = int(np.ptp(found.flowed) / QUARTZ_S)
+    if count < SEVERAL:
+        return 0.0
+    middle, medians = _medians(rest, count)
+    slopes = np.diff(medians) / (np.diff(middle) * found.period)
+    usual = float(np.median(slopes))
+    if not QUARTZ < float(np.abs(slopes - usual).max()) < HARDLY_A_DELAY:
+        return 0.0
+    beside = rest - usual * found.period * np.arange(len(rest))
+    low, level, high = np.quantile(beside, (0.25, 0.5, 0.75))
+    stray = np.abs(beside - level) + (high - low)
+    return stray if float(stray.max()) < shifts.MOST_S else 0.0  # no buffer grows by more
 
 
 def _noise(
