@@ -8,6 +8,7 @@ import json
 import subprocess
 import sys
 import threading
+import webbrowser
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from inspect import signature
@@ -76,7 +77,7 @@ class Workspace:
             "studies": self.studies, "open": self.open, "copy": self.copy, "show": self.show,
             "edit": self.edit, "splice": self.splice, "undo": self.undo, "redo": self.redo,
             "save": self.save, "reload": self.reload, "check": self.check, "schema": self.schema,
-            "run": self.run, "job": self.job, "stop": self.stop,
+            "run": self.run, "job": self.job, "stop": self.stop, "look": self.look,
         }  # fmt: skip
 
     @property
@@ -239,11 +240,22 @@ class Workspace:
         self._job(number).stop()
         return self._job(number).shown()
 
+    def look(self, path: str) -> dict[str, Any]:
+        """Open a report below the study's folder in the browser, as a file: not as this page."""
+        report = self._below(path, {".html"})
+        if report is None:
+            raise ProtocolError(f"there is no report {path!r} in the study's folder")
+        webbrowser.open(report.as_uri())
+        return {}
+
     def picture(self, path: str) -> Path | None:
         """Return a picture below the study's folder; None where there is none."""
+        return self._below(path, set(PICTURES))
+
+    def _below(self, path: str, suffixes: set[str]) -> Path | None:
         folder = self.document.path.parent.resolve()
         wanted = (folder / path).resolve()
-        there = wanted.is_relative_to(folder) and wanted.suffix in PICTURES and wanted.is_file()
+        there = wanted.is_relative_to(folder) and wanted.suffix in suffixes and wanted.is_file()
         return wanted if there else None
 
     def still_running(self) -> list[str]:

@@ -220,7 +220,7 @@ const drawDo = async () => {
       h("details", {}, h("summary", {}, `${t("more")} (${rest.length})`), rest.map((each) => option(each, one.options.indexOf(each)))))),
     h("section", { "aria-label": t("output") }, h("div", { className: "row", id: "jobs" }), h("code", { id: "command" }),
       h("p", { id: "status", role: "status" }), h("pre", { className: "log", id: "log", tabIndex: 0, role: "log", ariaLabel: t("output") }),
-      h("div", { id: "links", className: "row" }), h("div", { id: "pictures" }))));
+      h("div", { id: "links", className: "row" }), h("div", { id: "reports", className: "row" }), h("div", { id: "pictures" }))));
   drawJob();
 };
 // What runs is the file: it is saved first, and only if nothing has to be asked.
@@ -245,6 +245,8 @@ const drawJob = () => {
   find("status").textContent = job.status === null ? t("running") : job.status === 0 ? t("done") : t("failed", { status: job.status });
   const log = find("log"), low = log.scrollTop + log.clientHeight > log.scrollHeight - 20;
   if (log.textContent !== job.output) { log.textContent = job.output; if (low) log.scrollTop = log.scrollHeight; }
+  const reports = [...new Set(job.output.match(/\S+\.html\b/g) ?? [])];
+  if (find("reports").childElementCount !== reports.length) find("reports").replaceChildren(...reports.map((each) => h("button", { onclick: () => ask("look", { path: each }).then(() => tell(""), tell) }, t("open", { name: each }))));
   const links = [...new Set(job.output.match(/https?:\/\/(127\.0\.0\.1|localhost)\S+/g) ?? [])];
   if (find("links").childElementCount !== links.length) find("links").replaceChildren(...links.map((each) => h("a", { href: each, target: "_blank", rel: "noreferrer", className: "look" }, each.split("?")[0])));
   const pictures = job.pictures ?? [];

@@ -61,6 +61,22 @@ def test_only_studies_below_the_folder_or_opened_before_are_opened(
     assert workspace.studies()["recent"] == [str(outside)]
 
 
+def test_a_report_is_opened_as_a_file_and_only_below_the_study(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    workspace.open("mine/protocol.yaml")
+    report = workspace.root / "mine" / "report.html"
+    for path in (report, workspace.root / "other.html"):
+        path.write_text("<p>", encoding="utf-8")
+    workspace.look("report.html")
+    for path in ("../other.html", "protocol.yaml", "none.html"):
+        with pytest.raises(ProtocolError, match="no report"):
+            workspace.look(path)
+    assert opened == [report.as_uri()]
+
+
 def test_pictures_are_only_those_below_the_study(workspace: Workspace) -> None:
     workspace.open("mine/protocol.yaml")
     folder = workspace.root / "mine"
