@@ -18,6 +18,8 @@ import pytest
 from labcrane.cli.offered import OFFERED, offered
 from labcrane.cli.shipped import new_study
 from labcrane.errors import ProtocolError
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
 from labcrane.start.jobs import Option
 from labcrane.start.service import Workspace
 
@@ -102,6 +104,17 @@ def test_the_text_is_checked_as_it_is_typed_and_the_finding_has_its_place(
     assert "use: spere" in lines[finding["line"] - 1]
     assert (["feedback", "ball", "use"], finding["line"]) in [each[:2] for each in told["places"]]
     assert "spere" not in (workspace.root / "mine" / "protocol.yaml").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_a_saved_study_is_the_same_study_but_for_its_field(workspace: Workspace) -> None:
+    path = workspace.root / "mine" / "protocol.yaml"
+    before = load(path, discover()).protocol.model_dump()
+    workspace.open("mine/protocol.yaml")
+    workspace.edit(0, "set", ["participants", "planned"], 48)
+    workspace.save(1)
+    after = load(path, discover()).protocol.model_dump()
+    assert after == before | {"participants": before["participants"] | {"planned": 48}}
 
 
 @pytest.mark.slow
