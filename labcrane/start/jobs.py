@@ -143,4 +143,5 @@ def _of_its_own() -> dict[str, Any]:
     """Keep Ctrl-C of the start page's terminal from the commands that run."""
     if sys.platform == "win32":
         return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
-    return {"start_new_session": True}
+    else:  # noqa: RET505 - mypy judges each platform by itself
+        return {"start_new_session": True}
