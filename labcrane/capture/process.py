@@ -8,9 +8,11 @@ for which it ends (``failed``).
 """
 
 import itertools
+import shutil
 import sys
 import time
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -29,6 +31,10 @@ from labcrane.streams.outlets import SampleOutlet, channel, check_clock, stream_
 BEAT_S = 0.5
 TAKEN_S = 45.0
 """How long the recorder may take to receive the stream."""
+
+SPARE_BYTES = 200e6
+"""A recording leaves so much of the disk: a session without pictures can go on, one without room
+for its own record cannot."""
 
 DELIVERY_S = 0.3
 """How long the recorders are left to take what was sent last."""
@@ -55,14 +61,25 @@ def _follow(config: CaptureConfig, parent: Parent, recording: Capture) -> None:
     first, suffix = config.journal, recording.suffix
     files = ((at, captured_file(first, config.name, at, suffix)) for at in itertools.count(1))
     number, path = next((at, path) for at, path in files if not path.exists())
+    _leave_room(path.parent)
     recording.write_to(path)
     parent.tell({"file": path.name})
     try:
         while not parent.gone.is_set():
+            _leave_room(path.parent)
             index.push(number, recording.read())
     finally:
         index.push(number, recording.end())
         time.sleep(DELIVERY_S)
+
+
+def _leave_room(folder: Path) -> None:
+    free = shutil.disk_usage(folder).free
+    if free < SPARE_BYTES:
+        raise LabcraneError(
+            f"only {free / 1e6:.0f} MB are free at {folder}, and a recording leaves "
+            f"{SPARE_BYTES / 1e6:.0f} MB for the session itself; free some space"
+        )
 
 
 class _Index:

@@ -111,6 +111,7 @@ def _chosen(study: Study) -> dict[str, ComponentSpec]:
         f"input {study.input.name}": study.input,
         **{f"feedback {name}": choice for name, choice in (study.cues | study.sounds).items()},
         **{f"view {name}": choice for name, choice in study.views.items()},
+        **{f"recording {name}": choice for name, choice in study.recordings.items()},
     }
 
 

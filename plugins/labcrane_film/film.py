@@ -26,7 +26,7 @@ ERRORS = (av.error.FFmpegError, OSError, ValueError)
 RAW = frozenset({"rawvideo", "wrapped_avframe", "v210", "bitpacked"})
 """Codecs of pictures that are not compressed."""
 
-OPEN_S, READ_S = 20.0, 5.0
+OPEN_S, READ_S = 20.0, 3.0
 CLUSTER = {"cluster_time_limit": "1000", "flush_packets": "1"}
 """What is in the file survives any kill: a second at a time goes to the disk."""
 
@@ -73,13 +73,14 @@ class FilmedSource(Capture):
 
     def read(self) -> Sequence[Captured]:
         packet, arrival = self._next()
+        timed = self._timed(packet, arrival)  # frames before the file show how late others come
         begins = packet.is_keyframe or _is_raw(self._stream)
         if self._path is None or (self._file is None and not begins):
             return ()
         try:
             if self._file is None:
                 self._file = _File(self._path, self._stream, self._settings.codec)
-            return self._file.write(packet, *self._timed(packet, arrival))
+            return self._file.write(packet, *timed)
         except ERRORS as error:
             self._drop()  # what waits for the disk is lost, and was not returned
             raise DeviceError(
@@ -126,11 +127,11 @@ class FilmedSource(Capture):
     def _next(self) -> tuple[Any, float]:
         """Return the next frame and when it came."""
         try:
-            packet = next(self._packets)
+            packet = next(each for each in self._packets if each.size or each.pts is None)
         except (*ERRORS, StopIteration) as error:
             raise DeviceError(f"{self._called} sends no more: {error}; plug it in") from error
         arrival = time.perf_counter()
-        if not packet.size or packet.pts is None:
+        if packet.pts is None:
             raise DeviceError(f"{self._called} has ended, or sends frames without a time; check it")
         return packet, arrival
 

@@ -54,7 +54,7 @@ class FilmCameraSettings(SourceSettings):
     size: Annotated[tuple[PositiveInt, PositiveInt] | None, Usual(16, 16_384)] = None
     """Width and height in pixels; the camera's own by default."""
 
-    rate_hz: Annotated[PositiveFloat | None, Usual(0.1, 1000.0)] = None
+    rate_hz: Annotated[PositiveFloat | None, Usual(1.0, 1000.0)] = None
     """Pictures per second; the camera's own by default."""
 
     compression: str | None = None
@@ -99,7 +99,7 @@ class ScreenSettings(SourceSettings):
     part: tuple[int, int, PositiveInt, PositiveInt] | None = None
     """Left, top, width and height in pixels; the whole screen by default."""
 
-    rate_hz: Annotated[PositiveFloat, Usual(0.1, 1000.0)] = 30.0
+    rate_hz: Annotated[PositiveFloat, Usual(1.0, 1000.0)] = 30.0
     """Pictures per second."""
 
     lag_s: Annotated[float | None, Usual(1e-5, 2.0)] = 0.0

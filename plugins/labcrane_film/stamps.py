@@ -1,18 +1,21 @@
 """Times of frames on the session's clock, and what is known of them."""
 
+import math
 import time
-from collections import deque
 from collections.abc import Callable
 
 CLOCKS: tuple[Callable[[], float], ...] = (time.time, time.monotonic)
 """Clocks that drivers stamp with: the computer's date, and the time since it was started."""
 
+RESOLUTION_S = max(time.get_clock_info(each).resolution for each in ("time", "monotonic"))
+"""Some systems move these clocks on by steps of 16 ms."""
+
 OLDEST_S = 5.0
 """A frame does not come later than this after its capture: else its stamp is of another clock."""
 
 TRIES = 3
-SPREAD_OF = 300
-"""Over so many frames the spread of their arrivals is taken."""
+DRIFT = 1e-4
+"""Clocks of devices drift by less than this against the computer's."""
 
 
 class StampClock:
@@ -51,16 +54,23 @@ def _relation(clock: Callable[[], float]) -> tuple[float, float]:
         after = time.perf_counter()
         found.append(((after - before) / 2, (before + after) / 2 - there))
     error, offset = min(found)
-    return offset, error
+    return offset, error + RESOLUTION_S
 
 
 class ArrivalSpread:
-    """The spread of the arrivals of frames about their own regular stamps."""
+    """How late frames arrive, beyond the soonest, by stamps of an unknown clock.
+
+    A delay that grows and stays is not forgotten. What the device's clock may have drifted since
+    the soonest is added.
+    """
 
     def __init__(self) -> None:
-        self._late: deque[float] = deque(maxlen=SPREAD_OF)
+        self._soonest = math.inf
+        self._came = 0.0
 
     def of(self, pts: float, arrival: float, period: float) -> float:
         """Return by how much an arrival may be off, in seconds: at least a frame's duration."""
-        self._late.append(arrival - pts)
-        return max(max(self._late) - min(self._late), period)
+        late = arrival - pts
+        if late < self._soonest:
+            self._soonest, self._came = late, arrival
+        return max(late - self._soonest + DRIFT * (arrival - self._came), period)

@@ -202,8 +202,17 @@ def test_a_study_needs_looks_at_what_it_uses_and_at_nothing_else() -> None:
     ]
     everything, left_out = of_everything(registry)
     assert {"dual_joystick", "sonification", "view"} <= {look.name for look in everything}
-    alone = ("input can", "feedback vibration")  # they need an address
+    films = ("capture camera", "capture microphone", "capture screen")  # they need their consent
+    alone = ("input can", *films, "feedback vibration")  # the others need an address
     assert left_out == [f"{name}: give --protocol with a study that uses it" for name in alone]
+
+
+def test_a_study_that_films_needs_a_look_at_each_of_its_recordings(tmp_path: Path) -> None:
+    registry, protocol = discover(), tmp_path / "protocol.yaml"
+    face, room = "{use: camera, device: d, consent: a}", "{use: microphone, device: e, consent: b}"
+    protocol.write_text(f"{SHORT}\nrecordings: {{face: {face}, room: {room}}}\n")
+    areas = [look.area for look in of_study(load(protocol, registry), registry)]
+    assert areas[-2:] == ["recording face", "recording room"]
 
 
 def test_a_device_that_no_plugin_can_look_at_is_named(tmp_path: Path) -> None:

@@ -169,6 +169,10 @@ def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> C
     return Corrected(time, error, uneven, repeats.put_back(found.segments, own), quality)
 
 
+MISSING_S = 1.0
+"""Frames that are further apart, and by more than three usual steps, have a gap between them."""
+
+
 def as_stated(time: FloatArray, terms: Sequence[FloatArray], end: float | None) -> Corrected:
     """Return the times of captured frames: on our clock already, with a stated uncertainty.
 
@@ -177,7 +181,14 @@ def as_stated(time: FloatArray, terms: Sequence[FloatArray], end: float | None) 
     """
     error = np.sum(terms, axis=0)
     silent = end - float(time[-1]) if end is not None and len(time) else 0.0
-    quality = Quality(silent_s=silent, **_errors(time, error, time))
+    steps = np.diff(time)
+    gaps = steps[steps > max(MISSING_S, 3.0 * float(np.median(steps)))] if len(steps) else steps
+    quality = Quality(
+        silent_s=silent,
+        gaps=len(gaps),
+        longest_gap_s=float(gaps.max(initial=0.0)),
+        **_errors(time, error, time),
+    )
     return Corrected(time, error, time, quality=quality)
 
 

@@ -192,12 +192,12 @@ def _flow(nominal: float, samples: int, quality: Quality, limits: Limits) -> lis
                 "Hz",
                 "its timestamps were not dejittered; let the device warm up before you record",
             )
-        _add(
-            found,
-            limits.gap_s.judge(quality.longest_gap_s),
-            f"{quality.gaps} gaps, the longest {quality.longest_gap_s:.3f} s",
-            "check the device's cable, radio link and battery; exclude the affected trials",
-        )
+    _add(
+        found,
+        limits.gap_s.judge(quality.longest_gap_s),
+        f"{quality.gaps} gaps, the longest {quality.longest_gap_s:.3f} s",
+        "check the device's cable, radio link and battery; exclude the affected trials",
+    )
     _add(
         found,
         limits.missing.judge(quality.dropped / (samples + quality.dropped)),
