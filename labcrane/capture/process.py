@@ -8,6 +8,7 @@ for which it ends (``failed``).
 """
 
 import itertools
+import math
 import shutil
 import sys
 import time
@@ -37,7 +38,7 @@ SPARE_BYTES = 200e6
 for its own record cannot."""
 
 DELIVERY_S = 0.3
-"""How long the recorders are left to take what was sent last."""
+"""How long the recorders are left to begin, and to take what was sent last."""
 
 
 def run(config: CaptureConfig, parent: Parent) -> None:
@@ -55,9 +56,12 @@ def run(config: CaptureConfig, parent: Parent) -> None:
 
 def _follow(config: CaptureConfig, parent: Parent, recording: Capture) -> None:
     index = _Index(config, parent)
-    while not index.taken and not parent.gone.is_set():
+    settled = math.inf
+    while time.monotonic() < settled and not parent.gone.is_set():
         recording.read()
         index.beat()
+        if index.taken:  # a receiver counts before it receives
+            settled = min(settled, time.monotonic() + DELIVERY_S)
     first, suffix = config.journal, recording.suffix
     files = ((at, captured_file(first, config.name, at, suffix)) for at in itertools.count(1))
     number, path = next((at, path) for at, path in files if not path.exists())
