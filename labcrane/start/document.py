@@ -58,8 +58,9 @@ class Document:
         ProtocolError
             The file cannot be read as text, or has two kinds of line ends.
         """
+        # Before the text: what another program writes in between is a newer file.
+        raw = path.read_bytes() if path.is_file() else b""
         text = read_text(path)
-        raw = path.read_bytes()
         if 0 < raw.count(b"\r\n") < raw.count(b"\n"):
             raise ProtocolError(
                 f"{path} has line ends of Windows and of other systems; save it with one kind"
@@ -90,7 +91,7 @@ class Document:
         ProtocolError
             ``revision`` is not the current one: another window has changed the text.
         """
-        self._check(revision)
+        self.check_revision(revision)
         if text != self.text:
             self._undo.append(self.text)
             self._redo.clear()
@@ -98,14 +99,14 @@ class Document:
 
     def undo(self, revision: int) -> None:
         """Take the last change back; nothing without one."""
-        self._check(revision)
+        self.check_revision(revision)
         if self._undo:
             self._redo.append(self.text)
             self._become(self._undo.pop())
 
     def redo(self, revision: int) -> None:
         """Make the change again that was taken back last."""
-        self._check(revision)
+        self.check_revision(revision)
         if self._redo:
             self._undo.append(self.text)
             self._become(self._redo.pop())
@@ -118,7 +119,7 @@ class Document:
         NewerFileError, ApprovedError
             The file has changed, or is approved, and this was not agreed to.
         """
-        self._check(revision)
+        self.check_revision(revision)
         if self.changed_on_disk and not over_newer:
             raise NewerFileError(f"{self.path} was changed by another program since it was opened")
         if self.approved and not over_approved:
@@ -127,17 +128,19 @@ class Document:
                 "has recorded it"
             )
         ends = "\r\n" if b"\r\n" in self._raw() else "\n"
-        write_text(self.path, self.text.replace("\n", ends), SHARED_FILE)
+        written = self.text.replace("\n", ends)
+        write_text(self.path, written, SHARED_FILE)
         self._drop()
-        self.base, self.restored = _hash(self._raw()), False
+        self.base, self.restored = _hash(written.encode()), False
 
     def reload(self, revision: int) -> None:
         """Take the file as another program left it; undo brings the text back."""
-        self._check(revision)
-        text, before = read_text(self.path), self.text
+        self.check_revision(revision)
+        base, before = _hash(self._raw()), self.text
+        text = read_text(self.path)
         self._undo.append(before)
         self._drop()
-        self.text, self.base, self.restored = text, _hash(self._raw()), False
+        self.text, self.base, self.restored = text, base, False
         self.revision += 1
 
     @property
@@ -155,7 +158,7 @@ class Document:
         data, places, why = None, [], ""
         try:
             data, places = parse_yaml(self.text, self.path.name), positions(self.text)
-        except ProtocolError as error:
+        except (ProtocolError, ValueError, RecursionError) as error:
             why = str(error)
         return {
             "path": str(self.path),
@@ -180,7 +183,8 @@ class Document:
             ),
         }
 
-    def _check(self, revision: int) -> None:
+    def check_revision(self, revision: int) -> None:
+        """Raise :class:`ProtocolError` if another window has changed the study meanwhile."""
         if revision != self.revision:
             raise ProtocolError("another window has changed the study; reload this page")
 
@@ -206,7 +210,7 @@ class Document:
 
 
 def _drafts(path: Path) -> list[Path]:
-    return sorted(path.parent.glob(f".{glob.escape(path.name)}.*.unsaved"))
+    return sorted(path.parent.glob(f".{glob.escape(path.name)}.{'[0-9a-f]' * HASH}.unsaved"))
 
 
 def _hash(raw: bytes) -> str:

@@ -182,7 +182,7 @@ export class Form {
 
   map(schema, value, place) {
     const name = h("input", { "aria-label": `${this.words("name")}: ${place.join(" ")}`, placeholder: this.words("name"), "data-place": key([...place, "+"]) });
-    const add = () => { name.defaultValue = name.value; if (name.value.trim()) this.send("set", [...place, name.value.trim()], this.skeleton(schema.additionalProperties, name.value.trim())); };
+    const add = () => { name.defaultValue = name.value; if (name.value.trim() && !Object.hasOwn(value, name.value.trim())) this.send("set", [...place, name.value.trim()], this.skeleton(schema.additionalProperties, name.value.trim())); };
     name.addEventListener("keydown", (event) => { if (event.key === "Enter") add(); });
     return h("div", { className: "group" },
       Object.entries(value).map(([own, each]) => h("div", { className: "field", role: "group", "aria-label": own },

@@ -95,7 +95,7 @@ class Job:
         environment = {**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "72"}
         with self.log.open("wb") as out:
             self._process = subprocess.Popen(  # noqa: S603 - labcrane itself, without a shell
-                [sys.executable, "-m", "labcrane", *self.words],
+                [sys.executable, "-P", "-m", "labcrane", *self.words],
                 cwd=self.folder,
                 stdin=subprocess.DEVNULL,
                 stdout=out,

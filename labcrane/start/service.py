@@ -119,7 +119,10 @@ class Workspace:
                 f"{wanted} is outside {self.root}; start labcrane with that study's folder"
             )
         with self._lock:
-            self._document = Document.open(wanted)
+            opened = Document.open(wanted)
+            if self._document is not None:  # a page of the study before is refused
+                opened.revision = self._document.revision + 1
+            self._document = opened
             remember(wanted)
             return self._document.shown()
 
@@ -213,11 +216,12 @@ class Workspace:
             self._schemas[path] = json.loads(said.stdout)
         return self._schemas[path]
 
-    def run(self, command: str, given: dict[str, Any]) -> dict[str, Any]:
+    def run(self, revision: int, command: str, given: dict[str, Any]) -> dict[str, Any]:
         """Start a command in the study's folder."""
         if command not in self._offered:
             raise ProtocolError(f"the page does not offer labcrane {command!r}")
         with self._lock:
+            self.document.check_revision(revision)
             number = len(self._jobs)
             words = self._offered[command].words(given)
             job = Job(number, words, self.document.path.parent, self.scratch / f"{number}.txt")
@@ -271,7 +275,7 @@ class Workspace:
     def _labcrane(words: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
         try:
             return subprocess.run(  # noqa: S603 - labcrane itself, without a shell
-                [sys.executable, "-m", "labcrane", *words],
+                [sys.executable, "-P", "-m", "labcrane", *words],
                 cwd=folder, capture_output=True, encoding="utf-8", check=False, timeout=PATIENCE_S,
             )  # fmt: skip
         except subprocess.TimeoutExpired:
@@ -340,7 +344,8 @@ def application(workspace: Workspace) -> Any:
             return JSONResponse({"error": "\n".join(lines)}, REFUSED, fresh)
         except OSError as error:
             return JSONResponse({"error": str(error)}, REFUSED, fresh)
-        return JSONResponse(json.loads(json.dumps(answer, default=str)), headers=fresh)
+        plain = json.loads(json.dumps(answer, default=str), parse_constant=str)  # .nan and .inf
+        return JSONResponse(plain, headers=fresh)
 
     return Starlette(
         routes=[

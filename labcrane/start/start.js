@@ -24,8 +24,12 @@ const tell = (error) => { const at = find("alert"); at.textContent = error?.mess
 // Requests that change the study go one after the other, each with the revision that the one before gave.
 const inTurn = (run) => (queue = queue.then(run).then((value) => { tell(""); return value; }, tell));
 const change = (name, body = {}) => inTurn(async () => {
-  await typed();
-  take(await ask(name, { revision: doc.revision, ...body }));
+  const box = find("yaml");
+  if (box) box.readOnly = true; // what is typed meanwhile would take the change back
+  try {
+    await typed();
+    take(await ask(name, { revision: doc.revision, ...body }));
+  } finally { if (box) box.readOnly = false; }
 });
 
 const form = new Form((how, place, value) => change("edit", { how, place, value }), t, (one) => remedies(one));
@@ -97,7 +101,7 @@ const remedies = (one) => {
   const made = [];
   if (near && one.line) {
     const lines = doc.text.split("\n"), start = [...lines.slice(0, one.line - 1).join("\n")].length + (one.line > 1 ? 1 : 0);
-    const at = lines[one.line - 1].indexOf(near.wrong, 0);
+    const at = lines[one.line - 1].indexOf(near.wrong, one.column - 1);
     if (at >= 0) made.push(h("button", { onclick: () => change("splice", { begin: start + at, end: start + at + near.wrong.length, text: near.right }) }, t("use", { name: near.right })));
   }
   if (one.kind === "question" && one.key) made.push(h("button", { onclick: () => change("edit", { how: "insert", place: ["expected", (doc.data.expected ?? []).length], value: one.key }) }, t("intended")));
@@ -229,7 +233,7 @@ const start = async () => {
     take(await ask("save", { revision: doc.revision }));
     if (doc.ask) return;
   }
-  const job = await ask("run", { command, given });
+  const job = await ask("run", { revision: doc.revision, command, given });
   jobs.set(job.number, job);
   shown = job.number;
   drawJob();
@@ -248,7 +252,7 @@ const drawJob = () => {
   const reports = [...new Set(job.output.match(/\S+\.html\b/g) ?? [])];
   if (find("reports").childElementCount !== reports.length) find("reports").replaceChildren(...reports.map((each) => h("button", { onclick: () => ask("look", { path: each }).then(() => tell(""), tell) }, t("open", { name: each }))));
   const links = [...new Set(job.output.match(/https?:\/\/(127\.0\.0\.1|localhost)\S+/g) ?? [])];
-  if (find("links").childElementCount !== links.length) find("links").replaceChildren(...links.map((each) => h("a", { href: each, target: "_blank", rel: "noreferrer", className: "look" }, each.split("?")[0])));
+  if ([...find("links").children].map((each) => each.href).join() !== links.join()) find("links").replaceChildren(...links.map((each) => h("a", { href: each, target: "_blank", rel: "noreferrer", className: "look" }, each.split("?")[0])));
   const pictures = job.pictures ?? [];
   if (find("pictures").childElementCount !== pictures.length) find("pictures").replaceChildren(...pictures.map((each) => h("img", { className: "seen", src: `/picture/${each}`, alt: each })));
 };

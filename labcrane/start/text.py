@@ -20,6 +20,7 @@ from labcrane.files.yaml import parse_yaml
 _PLAIN = re.compile(r"[^\W\d][\w ./°%+-]*(?<! )")
 """A text that may stand without quotation marks everywhere, if it is read as a text."""
 
+_COLON = re.compile(r"\s*:")
 _BLOCKS = ("|", ">")
 
 
@@ -100,8 +101,9 @@ def _place_empty(text: str, node: Node | None) -> None:
     for key, child in _children(node):
         if isinstance(key, Node) and child.start_mark.index == child.end_mark.index:
             mark = copy(child.start_mark)
-            mark.index = text.index(":", key.end_mark.index) + 1
-            child.start_mark = child.end_mark = mark
+            if found := _COLON.match(text, key.end_mark.index):
+                mark.index = found.end()
+                child.start_mark = child.end_mark = mark
         _place_empty(text, child)
 
 

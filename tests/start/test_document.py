@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from labcrane.errors import ProtocolError
+from labcrane.start import document
 from labcrane.start.document import ApprovedError, Document, NewerFileError
 
 TEXT = "# mine\nlabcrane: 1\ntitle: One   # the first\n"
@@ -121,3 +122,23 @@ def test_a_text_that_cannot_be_read_is_kept_and_says_why(path: Path) -> None:
     assert (shown["text"], shown["data"]) == ("title: [\n", None)
     assert shown["unreadable"]
     assert Document.open(path).text == "title: [\n"
+
+
+def test_what_another_program_writes_right_after_a_save_is_a_newer_file(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was taken for what had been saved, and written over by the next save unasked."""
+    opened, write = Document.open(path), document.write_text
+
+    def overtaken(at: Path, text: str, mode: int) -> None:
+        write(at, text, mode)
+        if at == path:
+            path.write_text(OTHER, encoding="utf-8")
+
+    monkeypatch.setattr(document, "write_text", overtaken)
+    opened.change(0, TEXT + "a: 1\n")
+    opened.save(1)
+    assert opened.changed_on_disk
+    opened.change(opened.revision, TEXT + "a: 2\n")
+    with pytest.raises(NewerFileError):
+        opened.save(opened.revision)

@@ -168,19 +168,25 @@ def test_values_become_words_of_a_command_line_and_never_other_options() -> None
 @pytest.mark.slow
 def test_a_command_prints_its_line_and_its_output(workspace: Workspace) -> None:
     workspace.open("mine/protocol.yaml")
-    workspace.run("plan", {"protocol": "protocol.yaml", "participants": "2"})
+    workspace.run(
+        workspace.document.revision, "plan", {"protocol": "protocol.yaml", "participants": "2"}
+    )
     told = ended(workspace, 0)
     assert (told["status"], told["line"]) == (0, "labcrane plan --participants=2 protocol.yaml")
     assert "P002: slot 2" in told["output"]
     with pytest.raises(ProtocolError, match="does not offer"):
-        workspace.run("erase", {})
+        workspace.run(0, "erase", {})
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows stops by another signal")
 def test_stopping_is_stopping_the_command(workspace: Workspace) -> None:
     workspace.open("mine/protocol.yaml")
-    workspace.run("simulate", {"protocol": "protocol.yaml", "folder": "sim", "participants": "500"})
+    workspace.run(
+        workspace.document.revision,
+        "simulate",
+        {"protocol": "protocol.yaml", "folder": "sim", "participants": "500"},
+    )
     for _ in range(600):
         if (workspace.root / "mine" / "sim").exists():
             break
@@ -267,3 +273,39 @@ def test_a_server_that_is_killed_has_lost_nothing_that_was_sent(workspace: Works
         told = browser.ask("save", revision=0, over_newer=True)
         assert not told["unsaved"]
     assert file.read_text(encoding="utf-8") == before.replace("planned: 36", "planned: 48")
+
+
+def test_a_page_of_another_study_changes_and_runs_nothing(workspace: Workspace) -> None:
+    """What was typed in a tab of study A went into study B, which another tab had opened."""
+    other = new_study("crossover", workspace.root / "other")
+    first = workspace.open("mine/protocol.yaml")["revision"]
+    workspace.open("other/protocol.yaml")
+    before = other.read_bytes()
+    refused = (
+        lambda: workspace.splice(first, 0, 0, "# typed for the other\n"),
+        lambda: workspace.edit(first, "set", ["title"], "A"),
+        lambda: workspace.save(first),
+        lambda: workspace.run(first, "check", {"protocol": "protocol.yaml"}),
+    )
+    for each in refused:
+        with pytest.raises(ProtocolError, match="another window"):
+            each()
+    assert other.read_bytes() == before
+    assert not workspace.document.unsaved
+
+
+@pytest.mark.parametrize("end", ["zz: {x}", "? b", "a: .nan", "b: 1e999", "a: &x {b: *x}"])
+def test_a_text_half_written_is_shown_and_can_be_mended(workspace: Workspace, end: str) -> None:
+    """Every answer was an error, also after a restart: the draft brought the text back."""
+    shown = workspace.open("mine/protocol.yaml")
+    at = len(shown["text"])
+    shown = workspace.splice(shown["revision"], at, at, f"{end}\n")
+    assert workspace.show()["text"].endswith(f"{end}\n")
+    mended = workspace.splice(shown["revision"], at, at + len(end) + 1, "")
+    assert mended["data"]["study"]
+
+
+def test_a_module_in_the_studys_folder_is_not_imported(workspace: Workspace) -> None:
+    (workspace.root / "mine" / "random.py").write_text("raise SystemExit(3)")
+    workspace.open("mine/protocol.yaml")
+    assert workspace.check()["fine"]
