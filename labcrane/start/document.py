@@ -6,6 +6,7 @@ loses nothing. The draft's name holds the hash of the file that it was begun fro
 
 import glob
 import hashlib
+import stat
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -129,7 +130,10 @@ class Document:
             )
         ends = "\r\n" if b"\r\n" in self._raw() else "\n"
         written = self.text.replace("\n", ends)
-        write_text(self.path, written, SHARED_FILE)
+        mode = stat.S_IMODE(self.path.stat().st_mode) if self.path.exists() else SHARED_FILE
+        if not mode & stat.S_IWUSR:
+            raise ProtocolError(f"{self.path} is read-only; make it writable, then save again")
+        write_text(self.path, written, mode)
         self._drop()
         self.base, self.restored = _hash(written.encode()), False
 

@@ -74,7 +74,7 @@ class OfferedCommand:
             elif option.kind == "flag":
                 words += [option.flag if value else option.off] if value or option.off else []
             else:
-                for one in shlex.split(value) if option.kind == "many" else [str(value)]:
+                for one in _words(value) if option.kind == "many" else [str(value)]:
                     words += [f"{option.flag}={one}"] if option.flag else []
                     arguments += [] if option.flag else [one]
         return [*words, *(["--"] if any(a.startswith("-") for a in arguments) else []), *arguments]
@@ -137,6 +137,13 @@ class Job:
             It takes longer.
         """
         return self._process.wait(seconds)
+
+
+def _words(text: str) -> list[str]:
+    try:
+        return shlex.split(text)
+    except ValueError as error:
+        raise ProtocolError(f"{text!r} cannot be split into words: {error}") from error
 
 
 def _of_its_own() -> dict[str, Any]:

@@ -233,8 +233,8 @@ class Workspace:
         job = self._job(number)
         shown = job.shown()
         pictures = [
-            path.relative_to(self.document.path.parent).as_posix()
-            for path in sorted(self.document.path.parent.glob("*/*.png"))
+            path.relative_to(job.folder).as_posix()
+            for path in sorted(job.folder.glob("*/*.png"))
             if path.parent.name in shown["line"] and path.stat().st_mtime >= job.begun
         ]
         return {**shown, "pictures": pictures}
@@ -244,20 +244,22 @@ class Workspace:
         self._job(number).stop()
         return self._job(number).shown()
 
-    def look(self, path: str) -> dict[str, Any]:
-        """Open a report below the study's folder in the browser, as a file: not as this page."""
-        report = self._below(path, {".html"})
+    def look(self, number: int, path: str) -> dict[str, Any]:
+        """Open a report of a command in the browser, as a file: not as this page."""
+        report = self._below(number, path, {".html"})
         if report is None:
             raise ProtocolError(f"there is no report {path!r} in the study's folder")
         webbrowser.open(report.as_uri())
         return {}
 
-    def picture(self, path: str) -> Path | None:
-        """Return a picture below the study's folder; None where there is none."""
-        return self._below(path, set(PICTURES))
+    def picture(self, number: int, path: str) -> Path | None:
+        """Return a picture below the folder of a command; None where there is none."""
+        return self._below(number, path, set(PICTURES))
 
-    def _below(self, path: str, suffixes: set[str]) -> Path | None:
-        folder = self.document.path.parent.resolve()
+    def _below(self, number: int, path: str, suffixes: set[str]) -> Path | None:
+        if not 0 <= number < len(self._jobs):
+            return None
+        folder = self._jobs[number].folder.resolve()
         wanted = (folder / path).resolve()
         there = wanted.is_relative_to(folder) and wanted.suffix in suffixes and wanted.is_file()
         return wanted if there else None
@@ -326,7 +328,7 @@ def application(workspace: Workspace) -> Any:
         return FileResponse(found, headers=fresh)
 
     async def picture(request: "Request") -> "Response":
-        found = workspace.picture(request.path_params["path"])
+        found = workspace.picture(request.path_params["number"], request.path_params["path"])
         if found is None:
             return PlainTextResponse("labcrane: no such picture", NOT_FOUND)
         return FileResponse(found, headers=fresh, media_type=PICTURES[found.suffix])
@@ -351,7 +353,7 @@ def application(workspace: Workspace) -> Any:
         routes=[
             Route(f"/{START}", page),
             Route("/asset/{name}", asset),
-            Route("/picture/{path:path}", picture),
+            Route("/picture/{number:int}/{path:path}", picture),
             Route("/ask/{name}", ask, methods=["POST"]),
         ]
     )

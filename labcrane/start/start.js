@@ -249,12 +249,13 @@ const drawJob = () => {
   find("status").textContent = job.status === null ? t("running") : job.status === 0 ? t("done") : t("failed", { status: job.status });
   const log = find("log"), low = log.scrollTop + log.clientHeight > log.scrollHeight - 20;
   if (log.textContent !== job.output) { log.textContent = job.output; if (low) log.scrollTop = log.scrollHeight; }
-  const reports = [...new Set(job.output.match(/\S+\.html\b/g) ?? [])];
-  if (find("reports").childElementCount !== reports.length) find("reports").replaceChildren(...reports.map((each) => h("button", { onclick: () => ask("look", { path: each }).then(() => tell(""), tell) }, t("open", { name: each }))));
-  const links = [...new Set(job.output.match(/https?:\/\/(127\.0\.0\.1|localhost)\S+/g) ?? [])];
-  if ([...find("links").children].map((each) => each.href).join() !== links.join()) find("links").replaceChildren(...links.map((each) => h("a", { href: each, target: "_blank", rel: "noreferrer", className: "look" }, each.split("?")[0])));
-  const pictures = job.pictures ?? [];
-  if (find("pictures").childElementCount !== pictures.length) find("pictures").replaceChildren(...pictures.map((each) => h("img", { className: "seen", src: `/picture/${each}`, alt: each })));
+  const draw = (id, parts, made) => {
+    const at = find(id), key = JSON.stringify([job.number, parts]);
+    if (at.dataset.of !== key) { at.dataset.of = key; at.replaceChildren(...parts.map(made)); }
+  };
+  draw("reports", [...new Set(job.output.match(/\S+\.html\b/g) ?? [])], (each) => h("button", { onclick: () => ask("look", { number: job.number, path: each }).then(() => tell(""), tell) }, t("open", { name: each })));
+  draw("links", [...new Set(job.output.match(/https?:\/\/(127\.0\.0\.1|localhost)(?=[:/])\S+/g) ?? [])], (each) => h("a", { href: each, target: "_blank", rel: "noreferrer", className: "look" }, each.split("?")[0]));
+  draw("pictures", job.pictures ?? [], (each) => h("img", { className: "seen", src: `/picture/${job.number}/${each}`, alt: each }));
 };
 setInterval(async () => {
   const job = jobs.get(shown);

@@ -1,5 +1,7 @@
 """What is edited is never lost, and never written over what another program or a board has made."""
 
+import os
+import stat
 from pathlib import Path
 
 import pytest
@@ -142,3 +144,18 @@ def test_what_another_program_writes_right_after_a_save_is_a_newer_file(
     opened.change(opened.revision, TEXT + "a: 2\n")
     with pytest.raises(NewerFileError):
         opened.save(opened.revision)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such permissions")
+def test_a_saved_file_keeps_its_permissions_and_one_that_is_read_only_its_text(path: Path) -> None:
+    path.chmod(0o660)
+    opened = Document.open(path)
+    opened.change(0, TEXT + "a: 1\n")
+    opened.save(1)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o660
+    path.chmod(0o440)
+    opened.change(opened.revision, TEXT + "a: 2\n")
+    with pytest.raises(ProtocolError, match="is read-only"):
+        opened.save(opened.revision)
+    assert path.read_text(encoding="utf-8") == TEXT + "a: 1\n"
+    assert opened.unsaved

@@ -63,6 +63,7 @@ def test_only_studies_below_the_folder_or_opened_before_are_opened(
     assert workspace.studies()["recent"] == [str(outside)]
 
 
+@pytest.mark.slow
 def test_a_report_is_opened_as_a_file_and_only_below_the_study(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -72,22 +73,28 @@ def test_a_report_is_opened_as_a_file_and_only_below_the_study(
     report = workspace.root / "mine" / "report.html"
     for path in (report, workspace.root / "other.html"):
         path.write_text("<p>", encoding="utf-8")
-    workspace.look("report.html")
+    workspace.run(0, "plan", {"protocol": "protocol.yaml"})
+    ended(workspace, 0)
+    workspace.look(0, "report.html")
     for path in ("../other.html", "protocol.yaml", "none.html"):
         with pytest.raises(ProtocolError, match="no report"):
-            workspace.look(path)
+            workspace.look(0, path)
     assert opened == [report.as_uri()]
 
 
+@pytest.mark.slow
 def test_pictures_are_only_those_below_the_study(workspace: Workspace) -> None:
     workspace.open("mine/protocol.yaml")
     folder = workspace.root / "mine"
     (folder / "seen").mkdir()
     for path in (folder / "seen" / "a.png", workspace.root / "b.png"):
         path.write_bytes(b"png")
-    assert workspace.picture("seen/a.png") == folder / "seen" / "a.png"
+    workspace.run(0, "plan", {"protocol": "protocol.yaml"})
+    ended(workspace, 0)
+    assert workspace.picture(1, "seen/a.png") is None, "of no command"
+    assert workspace.picture(0, "seen/a.png") == folder / "seen" / "a.png"
     for path in ("../b.png", "protocol.yaml", "seen/c.png", "/etc/hostname"):
-        assert workspace.picture(path) is None
+        assert workspace.picture(0, path) is None
 
 
 @pytest.mark.slow
