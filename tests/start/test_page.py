@@ -44,6 +44,8 @@ const places = [...document.querySelectorAll('[data-place]')];
 return places.find(e => e.dataset.place === arguments[0]);
 """
 
+TEXT_AT = AT.replace(";\n", "?.innerText;\n").replace("]?.innerText;", "];")
+
 
 class Page:
     """The page as it is used: by its words and fields, not by what is behind them."""
@@ -61,6 +63,11 @@ class Page:
         wanted = json.dumps(list(place), separators=(",", ":"))
         wait_for(lambda: self.browser.execute_script(AT, wanted))
         return self.browser.execute_script(AT, wanted)
+
+    def text_at(self, *place: object) -> str:
+        """Return the text of a place as it is now; the page may draw it anew at any time."""
+        wanted = json.dumps(list(place), separators=(",", ":"))
+        return str(self.browser.execute_script(TEXT_AT, wanted))
 
     def write(self, value: str, *place: object) -> None:
         self.at(*place).send_keys(Keys.CONTROL, "a")
@@ -154,7 +161,7 @@ def test_steps_are_added_moved_and_removed_by_keyboard(page: Page) -> None:
     assert [*lines[:at], *lines[at + 1 :]] == before.splitlines()
     page.is_fine()
     page.at(*steps, 1, "later").send_keys(Keys.ENTER)
-    wait_for(lambda: "break" in page.at(*steps, 2).text)
+    wait_for(lambda: "break" in page.text_at(*steps, 2))
     page.at(*steps, 2, "remove").send_keys(Keys.ENTER)
     wait_for(lambda: page.yaml() == before)
 
