@@ -260,6 +260,8 @@ def _continued(before: RecordedStream, after: RecordedStream) -> RecordedStream:
     opened, ended = _opened(after), _last_heard(before)
     if overlap := opened is not None and opened <= ended:
         found = union(_keys(before), _keys(after))
+        if len(before.arrivals) and len(after.arrivals):
+            found = found.as_they_came(_came(before), _came(after))
     else:
         count = len(before.time_raw)
         here = np.arange(len(after.time_raw)) + count
@@ -289,6 +291,12 @@ def _continued(before: RecordedStream, after: RecordedStream) -> RecordedStream:
         starts=(*before.starts, *goes_on),
         own_clock=both_clocks(before.own_clock, after.own_clock),
     )
+
+
+def _came(stream: RecordedStream) -> FloatArray:
+    """Return when each sample came, in seconds; infinite where that is not known."""
+    which = np.searchsorted(stream.arrivals[:, 0], np.arange(len(stream.time_raw)), side="right")
+    return np.asarray(np.r_[stream.arrivals[:, 1], np.inf][which])
 
 
 def _told_once(

@@ -48,6 +48,28 @@ class Union:
         """How many samples both have."""
         return len(self.first) + len(self.second) - self.size
 
+    def as_they_came(self, first: FloatArray, second: FloatArray) -> "Union":
+        """Return the union in which samples that only one has are in the order of their arrival.
+
+        Parameters
+        ----------
+        first, second
+            When each sample of either came, in seconds.
+        """
+        whose = np.zeros(self.size, np.int64)
+        whose[self.first] += 1
+        whose[self.second] += 2
+        ends = np.flatnonzero(np.diff(whose)) + 1
+        places = [self.first.copy(), self.second.copy()]
+        for a, b, c in zip(np.r_[0, ends], ends, np.r_[ends, self.size][1:], strict=False):
+            if (whose[a], whose[b]) != (1, 2):
+                continue
+            here, there = np.searchsorted(self.first, (a, b)), np.searchsorted(self.second, (b, c))
+            if second[there[1] - 1] < first[here[0]]:
+                places[0][slice(*here)] += c - b
+                places[1][slice(*there)] -= b - a
+        return Union(places[0], places[1], self.size)
+
 
 def sample_keys(stamps: FloatArray, data: npt.NDArray[np.generic], texts: Texts) -> Keys:
     """Return 64 bits for each sample, made of the bits of its stamp and of its values.

@@ -84,3 +84,22 @@ def test_keys_of_a_million_different_samples_differ(dtype) -> None:
     data = random.integers(-100, 100, (10**6, 3)).astype(dtype)
     keys = sample_keys(np.arange(1e6) / 500.0, data, [])
     assert len(np.unique(keys)) == 10**6
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_one_recorder_alone_has_of_a_device_is_before_what_the_other_has_of_the_next(
+    seed: int,
+) -> None:
+    """A device was killed and restarted: its last sample stood behind 22 of the new one."""
+    random = np.random.default_rng(seed)
+    old, new = int(random.integers(1, 50)), int(random.integers(10, 50))
+    whole = np.arange(old + new)
+    came = whole * 0.01 + 5.0 * (whole >= old)
+    one = np.r_[whole[: old - int(random.integers(0, min(old, 4)))], whole[old:]]
+    other = np.r_[whole[:old], whole[old + int(random.integers(0, 9)) :]]
+    for first, second in ((one, other), (other, one)):
+        found = union(first.astype(np.uint64), second.astype(np.uint64))
+        found = found.as_they_came(came[first], came[second])
+        out = np.full(found.size, -1)
+        out[found.first], out[found.second] = first, second
+        assert out.tolist() == whole.tolist()
