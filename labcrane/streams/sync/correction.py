@@ -313,13 +313,11 @@ def _evened(
         part = slice(segment.start, segment.stop)
         # Nothing tells cut stamps from rounded ones, and so whether they are half a unit early.
         error[part] += sampling.grid_s / 2.0 + sampling.back_s + sampling.kept_s
-        error[part] += sampling.unsure_s + sampling.wander_s
+        error[part] += sampling.unsure_s
         if not declared:  # a mean that is known holds for the middle of a chunk
             error[part] += sampling.chunk_s
         if not treatment.can_drop_samples:  # nothing else tells uneven samples from late stamps
-            error[part] += NEARLY_ALL * sampling.uneven_s + sampling.slip_s
-        if sampling.strayed is not None:
-            error[part] += sampling.strayed
+            error[part] += NEARLY_ALL * sampling.uneven_s + sampling.slip_s + sampling.wander_s
         if sampling.shifted is not None:
             error[part] += sampling.shifted.open_s(segment.stop - segment.start)
         if way is Dejitter.AUTO and followed is not None and segment.basis is Basis.PROBES:
@@ -437,14 +435,13 @@ def _flow(placed: Placement, sampled: list[_Sampled], *, regular: bool) -> dict[
     """Return what the segments' sampling says together."""
     each = [sampling for _, sampling, _ in sampled]
     shifts = [one.shifted.by_s for one in each if one.shifted is not None]
-    strays = [one.strayed for one in each if one.strayed is not None]
     told = {
         "dropped": sum(one.missing for one in each),
         "uncounted": int(any(one.uncounted for one in each)),
         "disordered": sum(one.disordered for one in each),
         "stalls": sum(one.stalls for one in each),
         "longest_stall_s": max((one.longest_stall_s for one in each), default=0.0),
-        "strayed": sum(int(np.count_nonzero(one)) for one in strays),
+        "strayed": sum(one.strayed for one in each),
         "shifts": sum(len(one) for one in shifts),
         "shift_s": max((float(np.abs(one).max()) for one in shifts if len(one)), default=0.0),
         "grid_s": max((one.grid_s for one in each), default=0.0),

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.streams.sync.stamping import holes, levels, receipt, shifts, strays, units
+from labcrane.streams.sync.stamping import holes, levels, receipt, shifts, units, wander
 from labcrane.streams.sync.stamping.late_chunks import lost_before, lost_between, slope
 from labcrane.types import FloatArray
 
@@ -25,6 +25,8 @@ BURST = 1.0 / 3.0
 EXACT = 0.1
 """Stamps that scatter by less than this part of a period leave no doubt which are missing."""
 
+FEW_LOST = 0.1
+STRAY_S = 3e-4
 WHOLE = 0.25
 """A step this close to whole periods has lost whole samples."""
 
@@ -36,12 +38,6 @@ EARLIER = 0.1
 """At least this part of chunks stamped when sent waited for less than the one before."""
 
 RATE_CHANGE = 1e-3
-QUARTZ, HARDLY_A_DELAY = 1e-4, 1e-2
-"""A quartz that warms up changes its rate by less than the first. A delay that fades or grows looks
-like a change; by more than the second, samplers change their own rate, as cameras in the dark do.
-"""
-
-QUARTZ_S = 10.0
 LEAST_NOISE_S = 5e-5
 WITHIN = 0.75
 """Stamps on a grid scatter by half of its unit; what scatters by more was not taken evenly."""
@@ -101,8 +97,7 @@ class Sampling:
         By how much stamps scatter about a steady clock, at 95 %, that are taken to be right: as
         samples of an uneven sampler are, and those which are late by delays to both sides alike.
     strayed
-        By how much each sample is stamped beside its count for a while, shape ``(n,)``; None where
-        none is.
+        How many samples are stamped beside their count for a while, and back.
     breaks
         The samples behind holes of which nothing shows how many periods they are.
     unsure_s
@@ -118,8 +113,8 @@ class Sampling:
         By how much the middle of a chunk may be beside the sample that its stamps rest on, which
         may be the first or the last: the steps within a chunk are shorter than its samples take.
     wander_s
-        By how much stamps stray from an even count, shape ``(n,)``: the rate changed by more than a
-        quartz does, or a delay, by and by; nothing tells which.
+        By how much the level of stamps changes beside their count, shape ``(n,)``: the sampler's
+        rate changed by more than a quartz does, or a delay; nothing tells which.
     back_s
         By how much the clock of an irregular stream without arrivals may have been set back.
     behind
@@ -145,7 +140,7 @@ class Sampling:
     longest_stall_s: float = 0.0
     index: FloatArray = field(default_factory=lambda: np.empty(0))
     uneven_s: float = 0.0
-    strayed: FloatArray | None = None
+    strayed: int = 0
     breaks: npt.NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     unsure_s: FloatArray | float = 0.0
     back_s: float = 0.0
@@ -222,23 +217,23 @@ def examine(
     grid = coarse_unit(stamps, regular=True)
     if disordered:
         counts = index if counter is None else counter[order]  # who has none counts as they stand
-        found = _steps(time[order], counts, grid, counted=counter is not None)
+        found = _steps(time[order], counts, grid, counted=counter is not None, pauses=pauses)
     else:
-        found = _steps(time, index, grid, counted=counter is not None)
+        found = _steps(time, index, grid, counted=counter is not None, pauses=pauses)
     if pauses:
         found = replace(found, shifted=found.shifted.without_pauses())
     grid = 0.0 if _on_grid(found, stamps[order], grid) else grid
     shifted = found.exact and len(found.shifted.at) > 0
-    level, blurred = None, False
+    lost, blurred = None, False
     explained = found.computed and not found.missing and not found.clumped
     if probed and not disordered and not grid and not shifted and not explained:
         blurred = counter is None and (found.clumped or not (found.exact or found.computed))
         if blurred:
             find = levels.of_packets if found.clumped else levels.find
-            level = find(time, found.period)
+            lost = find(time, found.period)
         sure = slice(None)
-        if level is not None:
-            index, sure = index + level.lost, level.unsure == 0.0
+        if lost is not None:
+            index, sure = index + lost.lost, lost.unsure == 0.0
         flowed = time if counter is None else found.flowed
         waited = receipt.find(flowed[sure], index[sure])
         if waited is not None:
@@ -255,19 +250,27 @@ def examine(
                 stalls=stalls,
                 longest_stall_s=longest,
                 index=index,
-                unsure_s=0.0 if level is None else level.unsure * waited.period,
-                uncounted=blurred and level is None,
+                unsure_s=0.0 if lost is None else lost.unsure * waited.period,
+                uncounted=blurred and lost is None,
                 shift_s=receipt.open_shift(flowed, index),
                 breaks=found.breaks[: 0 if counter is None else None],
                 chunk_s=found.chunk_s,
+                wander_s=wander.find(
+                    found.unpaused,
+                    index if lost is None else index - lost.open,
+                    waited.period,
+                ).open_s,
             )
     noise, late, by_grid, uneven = _noise(time, arrival, found, grid)
     rates = _rates(found)
     steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
+    moves = None
+    if probed and not disordered:
+        moves = wander.find(found.unpaused, found.told, found.period)
     unplaced = late and counter is None and (found.clumped or found.missing > 0)
     return Sampling(
         found.period,
-        missing=found.missing if level is None else int(level.lost[-1]),
+        missing=found.missing if lost is None else int(lost.lost[-1]),
         gaps=found.gaps,
         longest_gap_s=found.longest,
         disordered=disordered,
@@ -277,19 +280,19 @@ def examine(
         reach_s=_reach(found),
         late_stamps=late,
         steady=steady,
-        uncounted=blurred and level is None,
+        uncounted=blurred and lost is None,
         unplaced=unplaced,
         shifted=found.shifted,
         stalls=stalls,
         longest_stall_s=longest,
         index=index if disordered else found.index,
         uneven_s=uneven,
-        strayed=None if disordered or rates else found.strayed,
+        strayed=0 if moves is None or rates else found.strayed(moves.passing_s),
         breaks=found.breaks,
         slip_s=found.period if found.slips else 0.0,
         shift_s=receipt.open_shift(found.flowed, found.index) if late else 0.0,
         chunk_s=found.chunk_s,
-        wander_s=_wander(found) if found.exact and not disordered else 0.0,
+        wander_s=0.0 if moves is None else moves.open_s,
     )
 
 
@@ -345,6 +348,8 @@ class _Steps:
 
     time: FloatArray
     flowed: FloatArray
+    unpaused: FloatArray
+    told: FloatArray
     breaks: npt.NDArray[np.intp]
     period: float
     local: FloatArray
@@ -356,12 +361,18 @@ class _Steps:
     computed: bool
     clumped: bool
     shifted: shifts.Shifts
-    strayed: FloatArray | None
+    stray_s: float
     slips: bool
     chunk_s: float
 
+    def strayed(self, passing_s: FloatArray) -> int:
+        """Return how many samples stray by more than steps scatter, and come back."""
+        return int(np.count_nonzero(passing_s > self.stray_s))
 
-def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -> _Steps:
+
+def _steps(
+    time: FloatArray, index: FloatArray, grid: float, *, counted: bool, pauses: bool
+) -> _Steps:
     steps, counts = np.diff(time), np.maximum(np.diff(index), 1.0)
     local = _local(steps / counts)
     typical = _typical(time, index)
@@ -372,6 +383,8 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
     rest = steps - whole * local
     scatter = 1.4826 * float(np.median(np.abs(rest)))
     odd = float((np.abs(rest) > WHOLE * local).mean())
+    # Where many steps are of two periods, the period is that of polls, and not the sampler's.
+    odd = max(odd, float((whole > counts).mean()) - FEW_LOST)
     exact = scatter < EXACT * float(np.median(local)) and odd < 0.01  # noqa: PLR2004
     same, in_chunks = _chunks(steps, counts * local)
     # Steps are computed by one rate, whatever the clock that stamps the chunks does meanwhile.
@@ -395,6 +408,8 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
     missing = int((whole - 1.0).sum())
     position = index if counted else index[0] + np.r_[0.0, np.cumsum(whole)]
     flowed = time - np.r_[0.0, np.cumsum(beyond - back)]
+    unpaused, told = _known(hole, shifted, counts, local, exact=exact, pauses=pauses)
+    unpaused, told = time - unpaused, index[0] + told
     mean, usual = slope(position, flowed), float(np.median(local))
     if computed and not clumped and not counted:
         first = np.r_[0, np.flatnonzero(~same) + 1]
@@ -405,18 +420,37 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
             position = position + np.repeat(before, np.diff(np.r_[first, len(time)]))
             missing += max(int(before[-1]), 1)
     longest = float(steps[gaps].max(initial=0.0))
-    strayed = None
     # A long hole may be off by a part of a period, and what is behind it seem to stray.
-    if exact and not grid and not len(breaks) and float(whole.max()) < strays.LONG_HOLE:
-        strayed = strays.find(flowed, position, usual, scatter)
-    if strayed is not None:
-        mean = slope(position[strayed == 0.0], flowed[strayed == 0.0])
+    even = exact and not grid and not len(breaks) and float(whole.max()) < levels.LONG_HOLE
     return _Steps(
-        time, flowed, breaks + 1, mean, local, position, missing, int(gaps.sum()), longest, exact,
-        computed, clumped, shifted, strayed,
+        time, flowed, unpaused, told, breaks + 1, mean, local, position, missing, int(gaps.sum()),
+        longest, exact, computed, clumped, shifted,
+        max(STRAY_S, 8.0 * scatter) if even else np.inf,
         exact and not counted and hole.may_be_slips(len(steps)),
         0.0 if exact else _half_a_chunk(steps / counts, typical),
     )  # fmt: skip
+
+
+def _known(
+    hole: holes.Holes,
+    shifted: shifts.Shifts,
+    counts: FloatArray,
+    usual: FloatArray,
+    *,
+    exact: bool,
+    pauses: bool,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the time in pauses and shifts before each sample, and its count, both from 0.
+
+    What holes of stamps that scatter are nothing tells, unless they are of one sample, longer than
+    a buffer, or declared.
+    """
+    lost, beyond, moved = hole.lost(len(counts)), hole.beyond(len(counts)), np.zeros(len(counts))
+    moved[shifted.at - 1] = shifted.by_s
+    long = (beyond + lost * usual >= wander.MOST_S) | pauses
+    told = counts + np.where(exact | (lost <= 1.0) | long, lost, 0.0)
+    unmoved = np.where(long & (moved == 0.0), beyond, moved)
+    return np.r_[0.0, np.cumsum(unmoved)], np.r_[0.0, np.cumsum(told)]
 
 
 def _chunks(steps: FloatArray, usual: FloatArray) -> tuple[npt.NDArray[np.bool_], bool]:
@@ -506,23 +540,6 @@ def _rates(found: _Steps) -> tuple[float, ...]:
     if found.exact or abs(ends[1] - ends[0]) > RATE_CHANGE * mean:
         return 1.0 / ends[0], 1.0 / ends[1]
     return ()
-
-
-def _wander(found: _Steps) -> FloatArray | float:
-    """Return how far stamps stray from an even count, where their rate changes as no quartz's."""
-    rest = found.flowed - found.period * found.index
-    count = int(np.ptp(found.flowed) / QUARTZ_S)
-    if count < SEVERAL:
-        return 0.0
-    middle, medians = _medians(rest, count)
-    slopes = np.diff(medians) / (np.diff(middle) * found.period)
-    usual = float(np.median(slopes))
-    if not QUARTZ < float(np.abs(slopes - usual).max()) < HARDLY_A_DELAY:
-        return 0.0
-    beside = rest - usual * found.period * np.arange(len(rest))
-    low, level, high = np.quantile(beside, (0.25, 0.5, 0.75))
-    stray = np.abs(beside - level) + (high - low)
-    return stray if float(stray.max()) < shifts.MOST_S else 0.0  # no buffer grows by more
 
 
 def _noise(
