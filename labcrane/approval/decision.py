@@ -174,8 +174,6 @@ def _lock(
         {
             "format": FORMAT,
             "format_version": VERSION,
-            "study": study.protocol.study,
-            "title": study.protocol.title,
             "approval": {
                 "board": grant.board,
                 "reference": grant.reference,
@@ -183,18 +181,31 @@ def _lock(
                 "valid_until": grant.valid_until.isoformat(),
                 "consent": consent.relative_to(study.path.parent).as_posix(),
             },
-            "materials": materials(study, registry, consent),
             "environment": environment(),
-            "machine_title": study.machine.title,
-            "settings": {
-                part: _settings(study, part)
-                for part in study.choices
-                if part.startswith(("tasks.", "feedback."))
-            },
-            "codebook": codebook.rows(codebook.codebook(study)),
             "history": history,
+            **_about(study, registry, consent),
         },
     )
+
+
+def planned(study: Study, registry: Registry) -> Lock:
+    """Return the content of a lock of a study before its approval, for a preregistration."""
+    return Lock(lock_path(study.path), {"history": [], **_about(study, registry)})
+
+
+def _about(study: Study, registry: Registry, consent: Path | None = None) -> dict[str, Any]:
+    return {
+        "study": study.protocol.study,
+        "title": study.protocol.title,
+        "materials": materials(study, registry, consent),
+        "machine_title": study.machine.title,
+        "settings": {
+            part: _settings(study, part)
+            for part in study.choices
+            if part.startswith(("tasks.", "feedback."))
+        },
+        "codebook": codebook.rows(codebook.codebook(study)),
+    }
 
 
 def _settings(study: Study, part: str) -> dict[str, dict[str, Any]]:

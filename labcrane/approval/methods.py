@@ -12,9 +12,7 @@ def methods(lock: Lock) -> str:
     materials = lock.content["materials"]
     protocol: Mapping[str, Any] = materials["protocol"]
     sentences = [
-        f"The study “{lock.content['title']}” was approved by {lock.approval['board']} "
-        f"(reference {lock.approval['reference']}, valid until {lock.approval['valid_until']})"
-        + _amended(lock),
+        f"The study “{lock.content['title']}” {_approved(lock)}",
         *_people(protocol),
         f"Participants operated the {lock.content['machine_title']} "
         f"({_use(protocol['dynamics'])}) with the input {_use(protocol['input'])} under the "
@@ -27,9 +25,22 @@ def methods(lock: Lock) -> str:
         *_sessions(protocol),
         f"The software was labcrane {materials['labcrane']['version']} with the plug-ins "
         + ", ".join(f"{name} {plugin['version']}" for name, plugin in materials["plugins"].items())
-        + f"; protocol, materials and source were locked (SHA-256 {lock.materials_sha256})",
+        + f"; protocol, materials and source {_fixed(lock)} (SHA-256 {lock.materials_sha256})",
     ]
     return ". ".join(sentences) + ".\n"
+
+
+def _approved(lock: Lock) -> str:
+    if "approval" not in lock.content:
+        return "is planned, and not approved yet"
+    return (
+        f"was approved by {lock.approval['board']} (reference {lock.approval['reference']}, valid "
+        f"until {lock.approval['valid_until']}){_amended(lock)}"
+    )
+
+
+def _fixed(lock: Lock) -> str:
+    return "were locked" if "approval" in lock.content else "are not locked yet"
 
 
 def _amended(lock: Lock) -> str:

@@ -27,7 +27,7 @@ from labcrane.errors import (
 
 MODULES = {
     "run": ("demo", "run", "resume"),
-    "check": ("start", "new_study", "check", "plan"),
+    "check": ("start", "new_study", "check", "plan", "pages"),
     "doctor": ("doctor", "report_problem"),
     "plugins": ("schema", "new_plugin"),
     "language_server": ("language_server",),

@@ -8,9 +8,9 @@ from typer.core import TyperCommand, TyperGroup
 
 SECTIONS = {
     "Prepare a study": (
-        "start", "new-study", "check", "plan", "doctor", "report-problem", "feedback", "simulate",
-        "power", "tracks", "approve", "amend", "methods", "bundle", "plugins", "new-plugin",
-        "schema", "language-server",
+        "start", "new-study", "check", "plan", "pages", "doctor", "report-problem", "feedback",
+        "simulate", "power", "tracks", "approve", "amend", "methods", "bundle", "plugins",
+        "new-plugin", "schema", "language-server",
     ),
     "Run": ("demo", "run", "resume", "consent", "streams", "record"),
     "Analyse": ("view", "report", "score", "export", "replay"),

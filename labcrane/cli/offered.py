@@ -11,8 +11,8 @@ from labcrane.cli.plugin_groups import first_line
 from labcrane.start.jobs import OfferedCommand, Option
 
 OFFERED = (
-    "check", "plan", "feedback preview", "doctor", "simulate", "power", "methods", "approve",
-    "amend", "consent", "run", "resume", "study", "view", "report", "score", "export",
+    "check", "plan", "pages", "feedback preview", "doctor", "simulate", "power", "methods",
+    "approve", "amend", "consent", "run", "resume", "study", "view", "report", "score", "export",
     "participants",
 )  # fmt: skip
 """Commands with a button on the page, in the order of a study."""

@@ -14,11 +14,15 @@ from typing import Any
 from labcrane.approval.lock import lock_path
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import SHARED_FILE, write_text
+from labcrane.files.study_folder import OURS
 from labcrane.files.yaml import parse_yaml, read_text
-from labcrane.start.text import positions
+from labcrane.start.text import positions, ties
 
 HASH = 16
 """Hexadecimal digits of a hash in a draft's name."""
+
+TEXTS = frozenset({".md", ".txt", ".yaml", ".yml"})
+"""Files of a study that can be edited as text."""
 
 
 class NewerFileError(ProtocolError):
@@ -31,10 +35,12 @@ class ApprovedError(ProtocolError):
 
 @dataclass
 class Document:
-    """A study's file and its text, as far as it was edited.
+    """A study's protocol, or another of its text files, as far as it was edited.
 
     Attributes
     ----------
+    study
+        The protocol of the study that the file belongs to.
     base
         Hash of the file from which the text comes.
     revision
@@ -42,6 +48,7 @@ class Document:
     """
 
     path: Path
+    study: Path
     base: str
     text: str
     revision: int = 0
@@ -51,8 +58,8 @@ class Document:
     _draft: Path | None = None
 
     @classmethod
-    def open(cls, path: Path) -> "Document":
-        """Open a file, with the draft of it that was not saved.
+    def open(cls, path: Path, study: Path | None = None) -> "Document":
+        """Open a file, by default a protocol, with the draft of it that was not saved.
 
         Raises
         ------
@@ -66,7 +73,7 @@ class Document:
             raise ProtocolError(
                 f"{path} has line ends of Windows and of other systems; save it with one kind"
             )
-        opened = cls(path, _hash(raw), text)
+        opened = cls(path, study or path, _hash(raw), text)
         for draft in _drafts(path):
             unsaved = draft.read_text(encoding="utf-8")
             opened._undo.append(opened.text)
@@ -125,7 +132,7 @@ class Document:
             raise NewerFileError(f"{self.path} was changed by another program since it was opened")
         if self.approved and not over_approved:
             raise ApprovedError(
-                f"{self.path} is approved; after a change, sessions run only once labcrane amend "
+                f"{self.study} is approved; after a change, sessions run only once labcrane amend "
                 "has recorded it"
             )
         ends = "\r\n" if b"\r\n" in self._raw() else "\n"
@@ -155,23 +162,28 @@ class Document:
     @property
     def approved(self) -> bool:
         """Whether the study has a lock."""
-        return lock_path(self.path).exists()
+        return lock_path(self.study).exists()
 
     def shown(self) -> dict[str, Any]:
         """Return all that a page shows of it."""
-        data, places, why = None, [], ""
+        data, places, tied, why = None, [], [], ""
         try:
-            data, places = parse_yaml(self.text, self.path.name), positions(self.text)
+            if self.path == self.study:
+                data = parse_yaml(self.text, self.path.name)
+                places, tied = positions(self.text), ties(self.text)
         except (ProtocolError, ValueError, RecursionError) as error:
             why = str(error)
+        folder = self.study.parent
         return {
             "path": str(self.path),
-            "name": self.path.name,
-            "folder": str(self.path.parent),
+            "name": self.path.relative_to(folder).as_posix(),
+            "study": self.study.name,
+            "folder": str(folder),
             "revision": self.revision,
             "text": self.text,
             "data": data,
             "places": places,
+            "tied": tied,
             "unreadable": why,
             "unsaved": self.unsaved,
             "restored": self.restored,
@@ -179,11 +191,12 @@ class Document:
             "approved": self.approved,
             "undo": bool(self._undo),
             "redo": bool(self._redo),
+            "protocols": [each.name for each in sorted(folder.glob("*.y*ml")) if is_protocol(each)],
             "files": sorted(
-                each.relative_to(self.path.parent).as_posix()
+                each.relative_to(folder).as_posix()
                 for pattern in ("*", "*/*")
-                for each in self.path.parent.glob(pattern)
-                if each.suffix in {".md", ".txt", ".yaml"} and not each.name.startswith(".")
+                for each in folder.glob(pattern)
+                if each.suffix in TEXTS and not each.name.startswith(".")
             ),
         }
 
@@ -211,6 +224,14 @@ class Document:
             return self.path.read_bytes()
         except FileNotFoundError:
             return b""
+
+
+def is_protocol(path: Path) -> bool:
+    """Say whether a YAML file is a protocol, and not another file of a study."""
+    try:
+        return not path.name.startswith(".") and bool(OURS.search(path.read_bytes()))
+    except OSError:
+        return False  # gone, or not for this user
 
 
 def _drafts(path: Path) -> list[Path]:

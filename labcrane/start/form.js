@@ -81,6 +81,11 @@ export class Form {
     return Boolean(known.enum || known.const !== undefined || typesOf(known).some((each) => ["string", "number", "boolean"].includes(each)));
   }
 
+  // Whether an anchor ties a value to another one: it can then be changed in the YAML only.
+  isTied(place) {
+    return !this.places.has(key(place)) || this.tied.some((one) => key(one) === key(place.slice(0, one.length)));
+  }
+
   title(name, schema) { return this.resolved(schema).title ?? String(name).replaceAll("_", " "); }
 
   help(schema) {
@@ -105,7 +110,11 @@ export class Form {
     control.setAttribute("data-place", key(place));
     if (help) control.setAttribute("aria-describedby", help.id);
     if (messages.length) control.setAttribute("aria-invalid", "true");
-    return h("div", { className: "field" }, h("label", { htmlFor: control.id }, this.title(name, schema)), control, help, messages);
+    const tied = value !== undefined && this.isTied(place);
+    if (tied) control.disabled = true;
+    return h("div", { className: "field" }, h("label", { htmlFor: control.id }, this.title(name, schema)), control,
+      tied ? h("small", { className: "question" }, this.words("tied"), " ") : null, help,
+      this.files?.includes(value) ? h("button", { onclick: () => this.openFile(value) }, this.words("open", { name: value })) : null, messages);
   }
 
   control(schema, value, place, required) {
@@ -164,7 +173,8 @@ export class Form {
   }
 
   // Settings that the study does not have yet; they are made when they are looked at.
-  more(schema, names, place) {
+  more(schema, all, place) {
+    const names = all.filter((name) => this.resolved(schema.properties[name]).const === undefined); // one value: no choice
     if (!names.length) return null;
     const own = `more ${key(place)}`, made = h("details", { open: this.opened.has(own) },
       h("summary", { "data-place": own }, `${this.words("more")} (${names.length})`));
@@ -232,6 +242,7 @@ export class Form {
       `${at + 1} ${kind(each)}`, h("small", {}, String(about(each))))))),
       h("div", { className: "row" }, select, this.button("add_step", add, [...place, "add"]),
         step === undefined ? null : [this.movers(value, now, place, (to) => this.chosen.set(key(place), to)), this.remover([...place, now])]),
+      ["consent", "instructions", "questionnaire"].includes(kind(step)) ? this.button("pages", () => this.preview(), [...place, now, "pages"]) : null,
       step === undefined ? null : this.messages([...place, now]), inner);
   }
 

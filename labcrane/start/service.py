@@ -4,6 +4,7 @@ Every request but the page itself is JSON. A request never names a path outside 
 study is written only after its text has been compared with the file.
 """
 
+import contextlib
 import json
 import subprocess
 import sys
@@ -18,13 +19,16 @@ from typing import TYPE_CHECKING, Any
 
 import labcrane.web.study
 from labcrane.errors import LabcraneError, ProtocolError
-from labcrane.files.study_folder import OURS, YAML
-from labcrane.start.document import ApprovedError, Document, NewerFileError
+from labcrane.files.atomic import SHARED_FILE, write_text
+from labcrane.files.lock import held
+from labcrane.files.study_folder import YAML
+from labcrane.limits import LIMITS
+from labcrane.start.document import TEXTS, ApprovedError, Document, NewerFileError, is_protocol
 from labcrane.start.jobs import Job, OfferedCommand
 from labcrane.start.recent import recent, remember
 from labcrane.start.text import edited
 from labcrane.web.server.access import START
-from labcrane.web.server.serving import serve_here
+from labcrane.web.server.serving import HOST, serve_here
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -44,6 +48,9 @@ ASSETS = {
 }
 """The page's own files, and the style of the study's page."""
 
+OPEN = ".labcrane-start"
+"""The lock file of a study that is open: two start pages would share its drafts."""
+
 BAD_REQUEST, NOT_FOUND, REFUSED = 400, 404, 409
 PICTURES = {".png": "image/png"}
 
@@ -57,16 +64,26 @@ class Workspace:
         The folder of the studies; no path outside it is opened, unless it was open before.
     scratch
         A folder for the output of commands.
+    address
+        Where this page is, for another one that is refused the same study.
     """
 
     def __init__(
-        self, root: Path, shipped: Sequence[str], offered: Sequence[OfferedCommand], scratch: Path
+        self,
+        root: Path,
+        shipped: Sequence[str],
+        offered: Sequence[OfferedCommand],
+        scratch: Path,
+        address: str = "",
     ) -> None:
         self.root = root
         self.scratch = scratch
+        self._address = address
         self._shipped = shipped
         self._offered = {each.name: each for each in offered}
         self._document: Document | None = None
+        self._opened: dict[Path, Document] = {}
+        self._held = contextlib.ExitStack()
         self._jobs: list[Job] = []
         self._schemas: dict[Path, Any] = {}
         self._lock = threading.RLock()
@@ -78,6 +95,7 @@ class Workspace:
             "edit": self.edit, "splice": self.splice, "undo": self.undo, "redo": self.redo,
             "save": self.save, "reload": self.reload, "check": self.check, "schema": self.schema,
             "run": self.run, "job": self.job, "stop": self.stop, "look": self.look,
+            "file": self.file, "plan": self.plan,
         }  # fmt: skip
 
     @property
@@ -99,7 +117,7 @@ class Workspace:
             path
             for pattern in DEPTH
             for path in self.root.glob(f"{pattern}.y*ml")
-            if path.suffix in YAML and not path.name.startswith(".") and _is_protocol(path)
+            if path.suffix in YAML and is_protocol(path)
         )
         return {
             "root": str(self.root),
@@ -119,12 +137,52 @@ class Workspace:
                 f"{wanted} is outside {self.root}; start labcrane with that study's folder"
             )
         with self._lock:
-            opened = Document.open(wanted)
-            if self._document is not None:  # a page of the study before is refused
-                opened.revision = self._document.revision + 1
-            self._document = opened
+            if self._document is None or self._document.study.parent != wanted.parent:
+                opened = Document.open(wanted)
+                lock = self._hold(wanted.parent)
+                self._held.close()
+                self._held, self._opened = lock, {wanted: opened}
             remember(wanted)
-            return self._document.shown()
+            return self._turn_to(wanted, wanted)
+
+    def file(self, name: str, new: bool = False) -> dict[str, Any]:  # noqa: FBT001, FBT002 - a key of a request
+        """Turn to a text file of the open study, or make it; what is unsaved elsewhere stays."""
+        with self._lock:
+            study = self.document.study
+            wanted = (study.parent / name).resolve()
+            hidden = wanted.name.startswith(".") or wanted.suffix not in TEXTS
+            if hidden or not wanted.is_relative_to(study.parent):
+                raise ProtocolError(
+                    f"{name!r} cannot name a text file of this study; give a name such as "
+                    f"instructions.md, which ends in one of {', '.join(sorted(TEXTS))}"
+                )
+            if new:
+                if wanted.exists():
+                    raise ProtocolError(f"{name} exists already; choose it from the files")
+                write_text(wanted, "", SHARED_FILE)
+            return self._turn_to(wanted, wanted if is_protocol(wanted) else study)
+
+    def _turn_to(self, path: Path, study: Path) -> dict[str, Any]:
+        opened = self._opened.get(path) or Document.open(path, study)
+        opened.study = study
+        if self._document is not None:  # a page of the file before is refused
+            opened.revision = max(opened.revision, self._document.revision) + 1
+        self._opened[path] = self._document = opened
+        return opened.shown()
+
+    def _hold(self, folder: Path) -> contextlib.ExitStack:
+        """Hold a study's folder against other start pages, with the address of this one in it."""
+        path, held_here = folder / OPEN, contextlib.ExitStack()
+        there = path.read_text(encoding="utf-8").splitlines()[1:] if path.is_file() else []
+        refusal = f"{folder} is open in another labcrane start, {' '.join(there) or 'elsewhere'}; "
+        held_here.enter_context(held(path, f"{refusal}go on there, or end that one"))
+        with path.open("a", encoding="utf-8") as file:
+            file.write(f"{self._address}\n")
+        return held_here
+
+    def close(self) -> None:
+        """Let go of the study that is open."""
+        self._held.close()
 
     def copy(self, shipped: str, name: str) -> dict[str, Any]:
         """Copy a shipped study into the folder, by ``labcrane new-study``, and open it."""
@@ -190,25 +248,40 @@ class Workspace:
             return self.document.shown()
 
     def check(self) -> dict[str, Any]:
-        """Return what ``labcrane check`` finds in the text as it is now."""
-        with self._lock:
-            document = self.document
-            path = document.draft if document.unsaved else document.path
-            revision = document.revision
+        """Return what ``labcrane check`` finds in the study as it is now."""
+        document, path, revision = self._study()
         said = self._labcrane(["check", path.name, "--json"], path.parent)
         try:
             told = json.loads(said.stdout.splitlines()[-1])
         except (IndexError, ValueError):
             raise ProtocolError(f"labcrane check failed: {said.stderr.strip()}") from None
         findings = [
-            {**each, "message": each["message"].replace(path.name, document.path.name)}
+            {**each, "message": each["message"].replace(path.name, document.study.name)}
             for each in told["findings"]
         ]
         return {"revision": revision, "fine": told["fine"], "findings": findings}
 
+    def plan(self) -> dict[str, Any]:
+        """Return what ``labcrane plan`` plans for each participant, and how balanced it is."""
+        document, path, _ = self._study()
+        said = self._labcrane(["plan", path.name, "--json"], path.parent)
+        if said.returncode:
+            why = said.stderr.strip().removeprefix("labcrane: ")
+            raise ProtocolError(why.replace(path.name, document.study.name))
+        line = f"labcrane plan {document.study.name}"
+        return {**json.loads(said.stdout), "line": line}
+
+    def _study(self) -> tuple[Document, Path, int]:
+        """Return the open file, the protocol with its unsaved text, and the revision."""
+        with self._lock:
+            document = self.document
+            protocol = self._opened.get(document.study)
+            path = protocol.draft if protocol and protocol.unsaved else document.study
+            return document, path, document.revision
+
     def schema(self) -> Any:
         """Return the JSON Schema of protocols, with the plugins in the study's folder."""
-        path = self.document.path
+        path = self.document.study
         if path not in self._schemas:
             said = self._labcrane(["schema", "--study", path.name], path.parent)
             if said.returncode:
@@ -224,7 +297,7 @@ class Workspace:
             self.document.check_revision(revision)
             number = len(self._jobs)
             words = self._offered[command].words(given)
-            job = Job(number, words, self.document.path.parent, self.scratch / f"{number}.txt")
+            job = Job(number, words, self.document.study.parent, self.scratch / f"{number}.txt")
             self._jobs.append(job)
             return job.shown()
 
@@ -286,13 +359,6 @@ class Workspace:
             ) from None
 
 
-def _is_protocol(path: Path) -> bool:
-    try:
-        return bool(OURS.search(path.read_bytes()))
-    except OSError:
-        return False  # gone, or not for this user
-
-
 def serve(
     root: Path,
     shipped: Sequence[str],
@@ -302,8 +368,10 @@ def serve(
 ) -> None:
     """Serve the start page to this computer until it is interrupted; ``say`` receives its link."""
     with TemporaryDirectory(prefix="labcrane-start-", ignore_cleanup_errors=True) as scratch:
-        workspace = Workspace(root, shipped, offered, Path(scratch))
-        serve_here(application(workspace), START, port, say)
+        address = f"http://{HOST}:{port}/{START}"
+        workspace = Workspace(root, shipped, offered, Path(scratch), address)
+        with contextlib.closing(workspace):
+            serve_here(application(workspace), START, port, say, LIMITS["YAML file"].most)
         for line in workspace.still_running():
             say(f"still running: {line}")
 

@@ -61,6 +61,21 @@ def positions(text: str) -> list[tuple[list[str | int], int, int]]:
     return list(_positions(_composed(text), ()))
 
 
+def ties(text: str) -> list[list[str | int]]:
+    """Return the places whose values an anchor ties to other ones: the text alone changes them."""
+    shared: dict[int, list[list[str | int]]] = {}
+
+    def look(node: Node | None, place: Place) -> None:
+        for key, child in _children(node):
+            inner: Place = (*place, key if isinstance(key, int) else str(key.value))
+            if id(child) not in shared:
+                look(child, inner)
+            shared.setdefault(id(child), []).append(list(inner))
+
+    look(_composed(text), ())
+    return [place for places in shared.values() if len(places) > 1 for place in places]
+
+
 def _positions(node: Node | None, place: Place) -> Iterator[tuple[list[str | int], int, int]]:
     begin = node.start_mark.index if node is not None else 0
     for key, child in _children(node):

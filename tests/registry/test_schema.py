@@ -137,6 +137,8 @@ def test_lists_checks_and_plans_are_there_for_programs(
     problems = json.loads(capsys.readouterr().out)["problems"]
     assert any("cue 'spere' is not installed; did you mean 'sphere'" in each for each in problems)
     assert main(["plan", str(protocol), "--participants", "2", "--json"]) == 0
-    plans = json.loads(capsys.readouterr().out)
+    told = json.loads(capsys.readouterr().out)
+    assert told["balance"], "of all who are planned"
+    plans = told["sessions"]
     assert [each["participant"] for each in plans] == ["P001", "P002"]
     assert all(block["trials"] == 32 for each in plans for block in each["blocks"])

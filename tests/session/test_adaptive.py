@@ -229,7 +229,7 @@ def test_a_plan_says_what_it_can_of_levels_that_are_not_chosen_yet(
     assert "at most 16 trials" in said
     assert "pairs by track 'reach' (QUEST+), from 1m_far_left to 4m_far_left, 8 rounds" in said
     assert main(["plan", str(path), "--participant", "P001", "--json"]) == 0
-    block = json.loads(capsys.readouterr().out)[0]["blocks"][0]
+    block = json.loads(capsys.readouterr().out)["sessions"][0]["blocks"][0]
     assert block["track"]["rounds"] == 8
     assert block["track"]["levels"]["4m_far_left"] == 4.0
     assert block["levels"] == {}

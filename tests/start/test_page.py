@@ -77,6 +77,7 @@ class Page:
         return str(self.browser.execute_script("return document.getElementById('yaml').value"))
 
     def copied(self, name: str = "mine") -> None:
+        Select(self.browser.find_element(By.ID, "shipped")).select_by_visible_text("aiming")
         field = self.browser.find_element(By.ID, "name")
         field.clear()
         field.send_keys(name)
@@ -213,18 +214,127 @@ def test_a_command_runs_with_its_line_its_output_and_a_stop(page: Page) -> None:
     page.copied()
     page.press("tab-do")
     wait_for(lambda: page.browser.find_elements(By.CSS_SELECTOR, "[data-place=plan]"))
-    page.browser.find_element(By.CSS_SELECTOR, "[data-place=plan]").click()
+    page.press("all > summary")
+    page.press("all [data-place=plan]")
     wait_for(lambda: "labcrane plan" in page.browser.find_element(By.ID, "main").text)
     page.press("start")
     wait_for(lambda: "balanced" in text(page.browser, "log"))
     assert text(page.browser, "command") == "labcrane plan protocol.yaml"
     assert not complaints(page.browser)
-    page.browser.find_element(By.CSS_SELECTOR, "[data-place=study]").click()
+    page.press("all [data-place=study]")
     wait_for(lambda: "labcrane study" in page.browser.find_element(By.ID, "main").text)
     page.press("start")
     wait_for(lambda: page.browser.find_elements(By.CSS_SELECTOR, "#links a"))
     page.press("stop")
     wait_for(lambda: text(page.browser, "status") not in {"Running", ""})
+
+
+REPLACE = """
+const box = document.getElementById('yaml');
+box.value = arguments[0];
+box.dispatchEvent(new Event('input'));
+"""
+
+
+def test_a_remedy_counts_signs_beyond_the_first_plane_as_one(page: Page) -> None:
+    """It replaced other letters: JavaScript counts 🏗 as two."""
+    page.copied()
+    data = page.browser.execute_async_script(
+        "const done = arguments[0];"
+        "fetch('/ask/show', {method: 'POST', body: '{}'}).then(a => a.json()).then(done)"
+    )["data"]
+    data = {"title": "🏗🏗 both 🏗", **{key: data[key] for key in data if key != "title"}}
+    right = json.dumps(data, ensure_ascii=False)
+    page.browser.execute_script(REPLACE, right.replace('"sphere"', '"spere"', 1))
+    wait_for(lambda: "did you mean 'sphere'" in text(page.browser, "findings"))
+    found = "//*[@id='findings']//button[text()='Use sphere']"
+    page.browser.find_element(By.XPATH, found).click()
+    wait_for(lambda: page.yaml() == right)
+
+
+def test_a_value_that_an_anchor_ties_says_that_it_is_changed_in_the_yaml(page: Page) -> None:
+    page.copied()
+    tied = page.yaml().replace("far: 4.0", "far: &far 4.0", 1).replace("far: 4.0", "far: *far", 1)
+    page.browser.execute_script(REPLACE, tied)
+    page.at("feedback").click()
+    for name in ("ball", "tone"):
+        wait_for(lambda name=name: page.at("feedback", name, "far").get_attribute("disabled"))
+        field = page.browser.execute_script(
+            "return arguments[0].closest('.field').innerText", page.at("feedback", name, "far")
+        )
+        assert "An anchor ties this to another value; change it in the YAML." in field
+    assert not page.at("feedback", "ball", "at").get_attribute("disabled")
+
+
+def test_a_paste_that_is_too_long_is_refused_with_the_limit(page: Page) -> None:
+    page.copied()
+    before = page.yaml()
+    page.browser.execute_script(REPLACE, "# " + "x" * 40_000 + "\n" + before)
+    page.press("save")
+    wait_for(lambda: "40" and text(page.browser, "state").endswith("saved"))
+    page.browser.execute_script(REPLACE, "# " + "x" * 300_000 + "\n" + before)
+    wait_for(lambda: "longer than the 256000 bytes" in text(page.browser, "alert"))
+
+
+def test_instructions_are_opened_at_their_step_edited_and_saved(page: Page, lab: Path) -> None:
+    page.copied()
+    page.write("Mine", "title")
+    wait_for(lambda: "title: Mine" in page.yaml())
+    page.browser.find_element(By.XPATH, "//button[text()='Open instructions.md']").click()
+    wait_for(lambda: text(page.browser, "title") == "instructions.md")
+    page.browser.execute_script(REPLACE, "Move the crane 🏗.\n")
+    wait_for(lambda: "Move the crane 🏗." in text(page.browser, "form"))
+    page.press("save")
+    file = lab / "mine" / "instructions.md"
+    wait_for(lambda: file.read_text(encoding="utf-8") == "Move the crane 🏗.\n")
+    Select(page.browser.find_element(By.ID, "file")).select_by_visible_text("New file")
+    page.browser.find_element(By.ID, "file-name").send_keys(Keys.CONTROL, "a")
+    page.browser.find_element(By.ID, "file-name").send_keys("tlx.yaml")
+    page.press("make")
+    wait_for(lambda: text(page.browser, "title") == "tlx.yaml")
+    Select(page.browser.find_element(By.ID, "file")).select_by_visible_text("protocol.yaml")
+    wait_for(lambda: text(page.browser, "title") == "protocol.yaml")
+    assert page.at("title").get_attribute("value") == "Mine", "unsaved, and kept"
+    assert complaints(page.browser) == []
+
+
+def test_the_plan_of_each_participant_is_a_table(page: Page) -> None:
+    page.copied()
+    page.at("participants").click()
+    page.write("8", "participants", "planned")
+    wait_for(lambda: "planned: 8" in page.yaml())
+    page.press("tab-plan")
+    wait_for(lambda: len(page.browser.find_elements(By.CSS_SELECTOR, "#plan tbody tr")) == 8)
+    assert text(page.browser, "balance").startswith("balanced: groups of equal size")
+    first = page.browser.find_element(By.CSS_SELECTOR, "#plan tbody tr").text
+    assert first.startswith("P001 1 acquisition")
+    assert "32" in first
+    assert "min" in first
+    assert complaints(page.browser) == []
+
+
+def test_the_pages_of_the_participant_are_opened_from_the_strip(page: Page) -> None:
+    Select(page.browser.find_element(By.ID, "shipped")).select_by_visible_text("whole")
+    page.press("copy")
+    page.is_fine()
+    page.at("sessions", 0, "steps", 0, "pages").send_keys(Keys.ENTER)
+    wait_for(lambda: page.browser.find_elements(By.CSS_SELECTOR, "#links a"))
+    link = page.browser.find_element(By.CSS_SELECTOR, "#links a").get_attribute("href")
+    assert text(page.browser, "command") == "labcrane pages protocol.yaml"
+    here = page.browser.current_window_handle
+    page.browser.switch_to.new_window("tab")
+    page.browser.get(link)
+    wait_for(lambda: text(page.browser, "text").startswith("Move the tip of the crane"))
+    page.browser.find_element(By.LINK_TEXT, "8 accuracy").click()
+    wait_for(lambda: page.browser.find_elements(By.ID, "submit"))
+    page.press("submit")
+    wait_for(lambda: "missing" in text(page.browser, "refusal"))
+    wait_for(lambda: page.browser.execute_script(PRESS, ".form-scale button"))
+    given = ".form-scale button:first-child[aria-pressed=true]"
+    wait_for(lambda: page.browser.find_elements(By.CSS_SELECTOR, given))
+    page.browser.close()
+    page.browser.switch_to.window(here)
+    page.press("stop")
 
 
 @pytest.mark.parametrize("language", ["en", "de", "pl", "fr", "es"])

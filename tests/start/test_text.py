@@ -13,7 +13,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from labcrane.cli.shipped import shipped_studies
 from labcrane.errors import ProtocolError
-from labcrane.start.text import edited, positions
+from labcrane.start.text import edited, positions, ties
 
 SHIPPED = [each / "protocol.yaml" for each in shipped_studies().values()]
 
@@ -231,3 +231,8 @@ def test_places_have_line_and_column() -> None:
     assert found[("list", 0)] == (5, 5)
     assert found[("list", 1, "x")] == (8, 6)
     assert found[("last", 1)] == (14, 11)
+
+
+def test_the_places_that_an_anchor_ties_are_named_and_no_others() -> None:
+    text = "a: &x {b: 1}\nc: *x\nd: &alone 2\ne: {<<: *x, f: 3}\n"
+    assert sorted(ties(text)) == [["a"], ["c"], ["e", "<<"]]

@@ -17,7 +17,7 @@ import pytest
 
 from labcrane.cli.offered import OFFERED, offered
 from labcrane.cli.shipped import new_study
-from labcrane.errors import ProtocolError
+from labcrane.errors import ProtocolError, StorageError
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.start.jobs import Option
@@ -61,6 +61,60 @@ def test_only_studies_below_the_folder_or_opened_before_are_opened(
     Workspace(tmp_path / "elsewhere", [], [], tmp_path).open("protocol.yaml")
     assert workspace.open(str(outside))["path"] == str(outside), "opened before"
     assert workspace.studies()["recent"] == [str(outside)]
+
+
+def test_a_study_that_another_start_page_has_open_is_refused_with_its_address(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    """They shared a draft: each wrote over what the other had taken in."""
+    new_study("crossover", workspace.root / "other")
+    at = "http://127.0.0.1:1/start"
+    first = Workspace(workspace.root, [], [], tmp_path, at)
+    first.open("mine/protocol.yaml")
+    workspace.open("other/protocol.yaml")
+    with pytest.raises(StorageError, match=f"mine is open in another labcrane start, {at}; .*end"):
+        workspace.open("mine/protocol.yaml")
+    assert workspace.document.study.parent.name == "other", "which stays open"
+    first.open("mine/protocol.yaml")
+    first.close()
+    workspace.open("mine/protocol.yaml")
+    workspace.close()
+    assert not list(workspace.root.glob("*/.labcrane-start"))
+
+
+def test_text_files_are_kept_and_saved_as_the_protocol_is(workspace: Workspace) -> None:
+    protocol = workspace.open("mine/protocol.yaml")
+    edit = ("set", ["participants", "planned"], 48)
+    protocol = workspace.edit(protocol["revision"], *edit)
+    told = workspace.file("instructions.md")
+    assert (told["name"], told["study"], told["data"]) == ("instructions.md", "protocol.yaml", None)
+    told = workspace.splice(told["revision"], 0, 0, "Read this 🏗.\n")
+    file = workspace.root / "mine" / "instructions.md"
+    file.write_text("by another program", encoding="utf-8")
+    assert workspace.save(told["revision"])["ask"] == "newer"
+    assert workspace.file("protocol.yaml")["data"]["participants"]["planned"] == 48
+    told = workspace.file("instructions.md")
+    workspace.save(told["revision"], over_newer=True)
+    assert file.read_text(encoding="utf-8").startswith("Read this 🏗.\n")
+    assert workspace.file("tlx.yaml", new=True)["text"] == ""
+    for name, why in (
+        ("../x.md", "cannot name"), (".x.md", "cannot name"), ("data.h5", "cannot name"),
+        ("tlx.yaml", "exists already"),
+    ):  # fmt: skip
+        with pytest.raises(ProtocolError, match=why):
+            workspace.file(name, new=True)
+
+
+@pytest.mark.slow
+def test_the_plan_is_that_of_the_text_as_it_is_typed(workspace: Workspace) -> None:
+    told = workspace.open("mine/protocol.yaml")
+    workspace.edit(told["revision"], "set", ["participants", "planned"], 8)
+    told = workspace.plan()
+    assert [each["participant"] for each in told["sessions"]] == [f"P00{n}" for n in range(1, 9)]
+    assert told["balance"] == [
+        "balanced: groups of equal size: none 2, visual 2, auditory 2, both 2"
+    ]
+    assert told["line"] == "labcrane plan protocol.yaml"
 
 
 @pytest.mark.slow
@@ -255,6 +309,11 @@ def test_the_door_lets_in_one_browser_of_this_computer_and_no_other_page(
         assert browser.get("/ask/studies", "GET")[0] == 405
         assert browser.get("/asset/service.py")[0] == 404
         assert browser.get("/ask/open", "POST", '{"path": "../../x.yaml"}')[0] == 409
+        browser.ask("open", path="mine/protocol.yaml")
+        pasted = {"revision": 0, "begin": 0, "end": 0, "text": f"# {'x' * 200_000}\n"}
+        assert len(browser.ask("splice", **pasted)["text"]) > 200_000
+        status, _, why = browser.get("/ask/splice", "POST", json.dumps({"text": "x" * 256_000}))
+        assert (status, why) == (413, "labcrane: more than 256000 bytes")
         for name, body in (("nix", "{}"), ("open", "{}"), ("open", "[1]"), ("open", "{")):
             assert browser.get(f"/ask/{name}", "POST", body)[0] == 400, (name, body)
 

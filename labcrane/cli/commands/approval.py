@@ -95,14 +95,24 @@ def amend(
 def methods(
     protocol: ProtocolHere,
     codebook: Annotated[Path | None, typer.Option(help="the codebook's path: a CSV file")] = None,
+    planned: Annotated[
+        bool, typer.Option("--planned", help="of a study before its approval: a preregistration")
+    ] = False,
 ) -> None:
     """Write the Methods paragraph and the codebook of an approved study."""
+    from labcrane.approval import decision
     from labcrane.approval.codebook import as_csv
     from labcrane.approval.lock import read_lock
     from labcrane.approval.methods import methods as paragraph
     from labcrane.files.atomic import SHARED_FILE, write_text
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
 
-    lock = read_lock(protocol)
+    if planned:
+        registry = discover(study=protocol)
+        lock = decision.planned(load(protocol, registry), registry)
+    else:
+        lock = read_lock(protocol)
     path = codebook or protocol.with_name(f"{protocol.stem}.codebook.csv")
     out.print(paragraph(lock), markup=False)
     write_text(path, as_csv(lock.content["codebook"]), SHARED_FILE)

@@ -1,4 +1,4 @@
-"""Commands before anything is run: start, new-study, check and plan."""
+"""Commands before anything is run: start, new-study, check, plan and pages."""
 
 import json
 from collections.abc import Sequence
@@ -175,7 +175,7 @@ def plan(
 ) -> None:
     """Show blocks, each participant's order and the expected session duration."""
     from labcrane.cli.commands.approval import today
-    from labcrane.design.allocation import allocate, as_csv, balance
+    from labcrane.design.allocation import allocate, as_csv
     from labcrane.design.plan import plan_session
     from labcrane.files.atomic import SHARED_FILE, write_text
     from labcrane.files.pseudonyms import pseudonyms
@@ -197,8 +197,10 @@ def plan(
         where, place = data_folder(data, protocol), export.resolve()
         with product(where, "plan", place.parent, names, today()) as made:
             write_text(made.folder / place.name, as_csv(allotments), SHARED_FILE)
+    lines = [] if participant else _balance(study, names)
     if as_json:
-        typer.echo(json.dumps([_row(each) for session in plans for each in session], indent=1))
+        rows = [_row(each) for session in plans for each in session]
+        typer.echo(json.dumps({"sessions": rows, "balance": lines}, indent=1))
         return
     for each in written_quantities(study):
         if isinstance(each.written, str):
@@ -206,18 +208,55 @@ def plan(
             out.print(line, markup=False)
     for session in plans:
         _print(session)
-    if not participant:
-        planned, whose = study.protocol.participants.planned, ""
-        if count < planned:  # a few of them do not show the balance
-            everyone = pseudonyms(study.protocol.participants.pattern, planned)
-            allotments, whose = (
-                allocate(study, dict.fromkeys(everyone)),
-                f"of all {planned} planned: ",
-            )
-        for line in balance(study, allotments):
-            out.print(f"{whose}{line}", markup=False)
+    for line in lines:
+        out.print(line, markup=False)
     if export:
         out.print(f"allocation: {export}", markup=False)
+
+
+def pages(
+    protocol: ProtocolHere,
+    participant: Annotated[
+        str | None, typer.Option(help="whose order is shown, by pseudonym; by default the first")
+    ] = None,
+    session: Annotated[int, typer.Option(help="which of the protocol's sessions", min=1)] = 1,
+    port: Annotated[int, typer.Option(help="port of the pages; 0 selects a free one")] = 0,
+) -> None:
+    """Show each page of the participant in a browser: texts, consent, questionnaires."""
+    from labcrane.cli.options import stay_on_this_computer
+    from labcrane.design.plan import plan_session
+    from labcrane.errors import PluginError
+    from labcrane.files.pseudonyms import pseudonyms
+    from labcrane.protocol.study import load
+    from labcrane.registry.offers import LAB, not_installed
+    from labcrane.registry.registry import discover
+
+    if missing := not_installed({"nicegui": LAB}):
+        raise PluginError(f"the preview of the pages {missing}")
+    stay_on_this_computer()
+    from labcrane.web.handle import free_port
+    from labcrane.web.preview import serve
+    from labcrane.web.server.serving import HOST
+
+    study = load(protocol, discover(study=protocol))
+    study.check_session(session)
+    name = participant or pseudonyms(study.protocol.participants.pattern, 1)[0]
+    plan = plan_session(study, name, session)
+    out.print("Ctrl-C ends it", markup=False)
+    serve(study, plan, free_port(HOST, port), lambda line: out.print(line, markup=False))
+
+
+def _balance(study: "Study", names: "Sequence[str]") -> list[str]:
+    """Return the balance; that of all who are planned, where fewer are listed."""
+    from labcrane.design.allocation import allocate, balance
+    from labcrane.files.pseudonyms import pseudonyms
+
+    people = study.protocol.participants
+    if len(names) >= people.planned:
+        return balance(study, allocate(study, dict.fromkeys(names)))
+    everyone = pseudonyms(people.pattern, people.planned)
+    lines = balance(study, allocate(study, dict.fromkeys(everyone)))
+    return [f"of all {people.planned} planned: {line}" for line in lines]
 
 
 def _row(session: "SessionPlan") -> dict[str, object]:

@@ -64,6 +64,8 @@ class Guard:
         Where the pages are served.
     denied
         Told of what was refused.
+    most_body
+        Bytes of the largest request.
     """
 
     def __init__(
@@ -74,8 +76,10 @@ class Guard:
         denied: Callable[[str], None],
         *,
         secure: bool = False,
+        most_body: int = MOST_BODY,
     ) -> None:
         self._inner = inner
+        self._most_body = most_body
         self._denied = denied
         names = {host, *(LOOPBACK if host in LOOPBACK else ())}
         self._hosts = {f"{name}:{port}" for name in names}
@@ -97,7 +101,7 @@ class Guard:
         if scope["type"] == "http":
             body = await self._body(headers, receive)
             if isinstance(body, int):
-                why = {413: f"more than {MOST_BODY} bytes", 408: "too slow"}[body]
+                why = {413: f"more than {self._most_body} bytes", 408: "too slow"}[body]
                 await self._refuse(scope, receive, send, body, why)
                 return
             receive = _given(body, receive)
@@ -158,11 +162,10 @@ class Guard:
             )
         return self._buckets[key]
 
-    @staticmethod
-    async def _body(headers: Mapping[bytes, bytes], receive: Any) -> bytes | int:
+    async def _body(self, headers: Mapping[bytes, bytes], receive: Any) -> bytes | int:
         """Return a request's body, or the status with which it is refused."""
         length = headers.get(b"content-length", b"0")
-        if not length.isdigit() or len(length) > 15 or int(length) > MOST_BODY:  # noqa: PLR2004
+        if not length.isdigit() or len(length) > 15 or int(length) > self._most_body:  # noqa: PLR2004
             return 413
         body: bytes
         body, ends = b"", asyncio.get_running_loop().time() + PATIENCE_S
@@ -173,7 +176,7 @@ class Guard:
             except TimeoutError:
                 return 408
             body += message.get("body", b"")
-            if len(body) > MOST_BODY:
+            if len(body) > self._most_body:
                 return 413
             if not message.get("more_body", False):
                 return body

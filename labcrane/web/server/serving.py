@@ -22,13 +22,19 @@ page unchanged. After that the page is reloaded; unsaved text is in the browser.
 MOST_MISSED = 1000
 
 
-def serve_here(app: Any, page: str, port: int, say: Callable[[str], None]) -> None:
+def serve_here(
+    app: Any,
+    page: str,
+    port: int,
+    say: Callable[[str], None],
+    most_body: int = LIMITS["request body"].most,
+) -> None:
     """Serve an application whose first page is ``page``; ``say`` is then told its one-time link."""
     from labcrane.web.server.guard import Guard  # noqa: PLC0415 - loads for a second
 
     keys = AccessKeys({page: secrets.token_urlsafe(24)}, {page: secrets.token_urlsafe(24)})
     link = f"http://{HOST}:{port}/{page}?token={keys.tokens[page]}"
-    guard = Guard(Gate(app, keys, lambda _: None, say, port), HOST, port, say)
+    guard = Guard(Gate(app, keys, lambda _: None, say, port), HOST, port, say, most_body=most_body)
     announcing(guard, HOST, port, lambda: say(f"{page}: {link}")).run()
 
 
