@@ -15,7 +15,7 @@ import labcrane
 from labcrane import ProtocolError
 from labcrane.approval.codebook import codebook
 from labcrane.approval.decision import Grant, amend
-from labcrane.approval.lock import read_lock
+from labcrane.approval.lock import lock_path, read_lock
 from labcrane.approval.methods import methods
 from labcrane.cli.app import main
 from labcrane.design.allocation import allocate, as_csv, balance
@@ -162,6 +162,24 @@ def test_methods_writes_the_codebook_beside_the_protocol(
         csv.DictReader((tmp_path / "study.codebook.csv").read_text(encoding="utf-8").splitlines())
     )
     assert rows == read_lock(lab.protocol).content["codebook"]
+
+
+def test_before_its_approval_a_study_has_the_same_paragraph_but_for_the_approval(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lab = Lab(tmp_path)
+    assert main(["methods", str(lab.protocol), "--planned"]) == 0
+    before = capsys.readouterr().out
+    assert not lock_path(lab.protocol).exists()
+    lab.approve()
+    assert main(["methods", str(lab.protocol)]) == 0
+    after = capsys.readouterr().out
+    said = re.sub(
+        r"was approved by .*? valid until [\d-]+\)", "is planned, and not approved yet", after
+    )
+    said = said.replace("were locked", "are not locked yet")
+    of_consent = re.compile(r"[0-9a-f]{64}")
+    assert of_consent.sub("", before) == of_consent.sub("", said)
 
 
 def orders(text: str, folder: Path, count: int) -> list[tuple[str, ...]]:

@@ -227,7 +227,7 @@ LOOKS = {
 }
 """They show what there is, and end: with what they are called here."""
 
-PAGES = {"study", "view", "language-server"}
+PAGES = {"study", "view", "pages", "language-server"}
 """They show what there is until they are stopped."""
 
 
