@@ -144,7 +144,7 @@ def _owner(path: Path) -> str:
     try:
         with path.open("rb") as file:
             file.seek(1)  # Windows lets nobody read the byte that is locked
-            return file.read(20).decode("ascii", "replace").strip() or "unknown"
+            return file.readline(20).decode("ascii", "replace").strip() or "unknown"
     except OSError:
         return "unknown"
 

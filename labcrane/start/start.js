@@ -250,7 +250,12 @@ const TASKS = [["rehearse", "check", { rehearse: true }], ["picture", "feedback 
   ["power", "power", { folder: "power", participants: "12,24", pool: "24", cohorts: "200" }], ["preregistration", "methods", { planned: true }],
   ["computer", "doctor", {}], ["pilot", "run", { participant: "P001", pilot: true }], ["go_on", "resume", { participant: "P001", pilot: true }],
   ["overview", "study", {}], ["report", "report", { include: "pilot", folder: "pilot-report" }], ["tables", "export", { to: "tables", folder: "tables", include: "pilot" }]];
-let settings = {}, allOpen = false;
+let settings = {}, allOpen = false, task = "";
+// The effect whose power is asked for: the first two groups of a study that has groups.
+const effect = () => {
+  const [one, other] = Object.keys(doc.data?.design?.groups ?? {});
+  return other ? { effect: `movement_time~group[${one},${other}]` } : {};
+};
 
 const drawDo = async () => {
   desk = await ask("studies");
@@ -264,11 +269,11 @@ const drawDo = async () => {
     : h("input", { id: `option-${at}`, value: given[option.name], required: option.required, oninput: (event) => { given[option.name] = event.target.value; } });
   const option = (each, at) => h("div", { className: "field" }, h("label", { htmlFor: `option-${at}` }, each.flag || each.name), input(each, at), h("small", {}, each.help));
   const needed = one.options.filter((each) => each.required || each.name in settings), rest = one.options.filter((each) => !needed.includes(each));
-  const pick = (name, how) => { command = name; settings = how; return drawDo(); };
+  const pick = (name, how, word = "") => { command = name; task = word; settings = name === "power" ? { ...how, ...effect() } : how; return drawDo(); };
   main.replaceChildren(h("div", { className: "work" },
     h("section", { "aria-label": t("do") }, h("div", { className: "scroll", tabIndex: 0, role: "group", ariaLabel: t("do") },
       h("div", { role: "group", "aria-label": t("tasks") }, h("h2", {}, t("tasks")), h("div", { className: "row" }, TASKS.map(([word, name, how]) =>
-        h("button", { "data-place": word, "aria-pressed": String(command === name && settings === how), onclick: () => pick(name, how).then(() => refocus(word)) }, t(word))))),
+        h("button", { "data-place": word, "aria-pressed": String(task === word), onclick: () => pick(name, how, word).then(() => refocus(word)) }, t(word))))),
       h("h2", {}, `labcrane ${one.name}`), h("p", {}, one.help),
       needed.map((each) => option(each, one.options.indexOf(each))),
       h("button", { id: "start", className: "main", onclick: () => inTurn(() => start(given)) }, t("run")),

@@ -72,7 +72,10 @@ def test_a_study_that_another_start_page_has_open_is_refused_with_its_address(
     first = Workspace(workspace.root, [], [], tmp_path, at)
     first.open("mine/protocol.yaml")
     workspace.open("other/protocol.yaml")
-    with pytest.raises(StorageError, match=f"mine is open in another labcrane start, {at}; .*end"):
+    with pytest.raises(
+        StorageError,
+        match=f"mine is open in another labcrane start, {at}; .*one \\(process {os.getpid()} holds",
+    ):
         workspace.open("mine/protocol.yaml")
     assert workspace.document.study.parent.name == "other", "which stays open"
     first.open("mine/protocol.yaml")
