@@ -49,10 +49,11 @@ class RecordingProcesses:
         """The descriptions of the streams that list their frames."""
         return tuple(handle.sends for handle in self._handles if handle.sends)
 
-    def stop(self) -> None:
-        """Let all end their files."""
+    def stop(self, say: Callable[[str], None]) -> None:
+        """Let all end their files, and say which cannot be ended."""
         for handle in self._handles:
-            handle.stop()
+            if handle.stop() is None:
+                say(f"{handle.name}: {handle.stuck}")
 
 
 def index_requests(visit: Visit) -> list[StreamRequest]:
@@ -91,6 +92,7 @@ class _Handle(ProcessHandle):
         self._failures = self._missed = self._told = 0
         self._said: set[str] = set()
         self._again = math.inf
+        self._left = False
         patience = Patience(START_S, SILENT_S, STOP_S)
         super().__init__(MODULE, f"recording {config.name}", patience, self._hear_of)
         self.start(config)
@@ -109,7 +111,9 @@ class _Handle(ProcessHandle):
             self._missed = self._told = 0
             self.start_anew(self._config)
         elif self._again == math.inf and (why := self.failure) is not None:
-            self.kill()
+            self._left = (self.exit_code if self._left else self.kill()) is None
+            if self._left:
+                return self._fresh([self.stuck])
             self._failures += 1
             self.ready = False
             self._again = time.monotonic() + PAUSE_S
@@ -119,6 +123,17 @@ class _Handle(ProcessHandle):
         if self._missed >= 2 * max(self._told, 0.5):
             self._told = self._missed
             news.append(f"{self._missed} frames were dropped so far, by the device or here")
+        return self._fresh(news)
+
+    @property
+    def stuck(self) -> str:
+        """The words about a process that cannot be ended."""
+        return (
+            f"its process {self.pid} cannot be ended, as its driver waits for the device; unplug "
+            "the device, or restart the computer after the session"
+        )
+
+    def _fresh(self, news: list[str]) -> list[str]:
         fresh = [each for each in news if each not in self._said]
         self._said |= {*fresh}
         return fresh

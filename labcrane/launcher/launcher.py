@@ -143,7 +143,7 @@ class Launcher:
             if self._feedback:
                 self._feedback.stop()
             if self._recordings:
-                self._recordings.stop()
+                self._recordings.stop(self._say)
             if self._recorder:
                 self._recorder.stop()
             if parts(visit.journal):

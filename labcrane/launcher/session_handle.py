@@ -61,4 +61,7 @@ class SessionHandle:
 
     def close(self) -> int:
         """Wait for its end; its exit code."""
-        return self._process.stop()
+        code = self._process.stop()
+        if code is None:
+            raise AssertionError("the session's end is waited for without a limit")
+        return code

@@ -20,6 +20,9 @@ from typing import IO, Any
 from labcrane.processes.messages import Inbox, received, send
 from labcrane.processes.watch_clock import WatchClock
 
+KILLED_S = 5.0
+"""How long a killed process may take to be gone: with a driver that waits, it may never be."""
+
 LAST_S = 1.0
 """How long reading the last messages of a process that has ended may take, in seconds."""
 
@@ -176,15 +179,17 @@ class ProcessHandle:
         return True
 
     def start_anew(self, order: object) -> None:
-        """End the present process and start another; the count of restarts begins again."""
+        """Start another process once the present one is ended; the count begins again."""
         self.kill()
         self.fruitless = 0
         self.restarts += 1
         self.ready = False
         self._life = self._begun(order)
 
-    def stop(self, patience_s: float | None = None) -> int:
+    def stop(self, patience_s: float | None = None) -> int | None:
         """Let the process end in order, and kill it when it does not; its exit code.
+
+        None where it cannot be ended, as while its driver waits for a device: it is left.
 
         ``patience_s`` is how long it may take, by default as its :class:`Patience` says.
         """
@@ -197,8 +202,8 @@ class ProcessHandle:
             life.process.kill()
         return self._buried(life)
 
-    def kill(self) -> int:
-        """End the process at once; its exit code."""
+    def kill(self) -> int | None:
+        """End the process at once; its exit code, or None as of :meth:`stop`."""
         life = self._present
         life.process.kill()
         life.outgoing.put(None)
@@ -240,8 +245,11 @@ class ProcessHandle:
         self._inbox.wake()
 
     @staticmethod
-    def _buried(life: _Life) -> int:
-        code = life.process.wait()
+    def _buried(life: _Life) -> int | None:
+        try:
+            code = life.process.wait(KILLED_S)
+        except subprocess.TimeoutExpired:
+            return None
         for thread in life.threads:
             thread.join()
         life.output.close()

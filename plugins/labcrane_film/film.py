@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -33,6 +34,9 @@ CLUSTER = {"cluster_time_limit": "1000", "flush_packets": "1"}
 LOOKED_AT = 20
 """So many frames an examination reads."""
 
+BACK = 3
+"""Timestamps that go back so often before a file begins are of B-frames."""
+
 DROPPED = 1.5
 """From so many periods between two stamps on, frames are missing between them."""
 
@@ -61,12 +65,13 @@ class FilmedSource(Capture):
             self._stream = getattr(self._input.streams, settings.kind)[0]
         except (*ERRORS, IndexError) as error:
             raise DeviceError(
-                f"{self._called} cannot be opened: {error}; plug it in, close other programs that "
-                "use it, and correct its settings in the protocol"
-            ) from error
+                f"{self._called} cannot be opened: {self._hidden(error)}; plug it in, close other "
+                "programs that use it, and correct its settings in the protocol"
+            ) from None  # the cause has the password of an address
         self._packets = self._input.demux(self._stream)
         rate = self._stream.average_rate if settings.kind == "video" else None
         self._period = float(1 / rate) if rate else 0.0
+        self._stamp, self._back = -math.inf, 0
 
     def write_to(self, path: Path) -> None:
         self._path = path
@@ -122,14 +127,21 @@ class FilmedSource(Capture):
 
     @property
     def _called(self) -> str:
-        return f"{self._device!r}" + (f" ({self._format})" if self._format else "")
+        return f"{self._hidden(self._device)!r}" + (f" ({self._format})" if self._format else "")
+
+    def _hidden(self, said: object) -> str:
+        """Return a text without the user and password of the device's address."""
+        login = re.search(r"://([^/]*@)", self._device)
+        return str(said).replace(login[1], "") if login else str(said)
 
     def _next(self) -> tuple[Any, float]:
         """Return the next frame and when it came."""
         try:
             packet = next(each for each in self._packets if each.size or each.pts is None)
         except (*ERRORS, StopIteration) as error:
-            raise DeviceError(f"{self._called} sends no more: {error}; plug it in") from error
+            raise DeviceError(
+                f"{self._called} sends no more: {self._hidden(error)}; plug it in"
+            ) from None
         arrival = time.perf_counter()
         if packet.pts is None:
             raise DeviceError(f"{self._called} has ended, or sends frames without a time; check it")
@@ -140,6 +152,15 @@ class FilmedSource(Capture):
         settings = self._settings
         unit = float(packet.time_base)
         stamp = packet.pts * unit
+        self._back += stamp <= self._stamp
+        # Once may be the first report of a network camera's clock. B-frames go back often, and are
+        # refused before a file begins: by doctor, and in a session once.
+        if self._back and (self._file is not None or self._back >= BACK):
+            raise DeviceError(
+                f"timestamps of {self._called} go back: it sends B-frames, or its clock was set; "
+                "switch B-frames off in the device"
+            )
+        self._stamp = stamp
         period = self._period or float(packet.duration or 0) * unit
         spread = self._spread.of(stamp, arrival, period)
         known = self._clock.time_of(stamp, arrival)
@@ -194,11 +215,6 @@ class _File:
         if self._first is None:
             self._first = packet.pts
         at = round((packet.pts - self._first) * packet.time_base / MS)
-        if self._last is not None and timed.pts <= self._last[1]:
-            raise DeviceError(
-                "timestamps of the device go back: its clock was set, or it sends B-frames; switch "
-                "these off in the device"
-            )
         number = 0
         if self._last is not None:
             before, stamp = self._last

@@ -11,6 +11,7 @@ from labcrane import ProtocolError
 from labcrane.cli.commands.check import examined
 from labcrane.participants import recovery as unfinished
 from labcrane.participants.copies import inventory
+from labcrane.protocol.questions import questions
 
 FILMED = GOVERNED + (
     "recordings:\n  face: {use: camera, device: /dev/video9, consent: we film your face}\n"
@@ -114,6 +115,22 @@ def test_a_study_is_not_approved_with_a_consent_text_that_does_not_name_a_record
         study.approve()
     edit(study.folder / "consent_v2.txt", "I take part.", "I know that We film\nyour FACE.")
     study.approve()
+
+
+@pytest.mark.parametrize(
+    ("said", "language", "asked"),
+    [("a", "en", 1), ("We FILM you", "en", 0), ("deine Face", "de", 0),
+     ("eine Kamera", "de", 0), ("a camera", "pl", 1)],
+)  # fmt: skip
+def test_words_that_name_no_recording_are_asked_about(
+    said: str, language: str, asked: int, tmp_path: Path
+) -> None:
+    lab = Lab(
+        tmp_path, FILMED.replace("we film your face", said) + f"page: {{language: {language}}}\n"
+    )
+    found = [each.text for each in questions(lab.study) if each.key == "recordings.face.consent"]
+    assert len(found) == asked
+    assert all("name neither recording 'face' nor what it is (" in text for text in found)
 
 
 def test_check_compares_the_recordings_with_the_consent_text_of_the_approval(study: Lab) -> None:

@@ -253,6 +253,39 @@ def test_missing_film_between_two_files_is_a_gap() -> None:
     assert as_stated(time[:90], [np.zeros(90)] * 3, 3.0).quality.gaps == 0
 
 
+def with_b_frames(path: Path) -> SourceSettings:
+    with av.open(str(path), "w") as file:
+        stream = file.add_stream("libx264", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 160, 120, "yuv420p"
+        stream.codec_context.max_b_frames = 2
+        for number in range(100):
+            frame = av.VideoFrame.from_ndarray(
+                np.full((120, 160, 3), 2 * number, np.uint8), format="rgb24"
+            )
+            frame.pts = number
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode())
+    return FilmCameraSettings(device=str(path), format="matroska", consent="we film")
+
+
+def test_b_frames_are_refused_by_name_before_a_file_begins(tmp_path: Path) -> None:
+    settings = with_b_frames(tmp_path / "source.mkv")
+    (found,) = examine(settings)
+    assert found.verdict is Verdict.FAIL
+    assert "source.mkv' (matroska) go back: it sends B-frames" in found.text
+
+
+@pytest.mark.parametrize("login", ["", "admin:s3cr@t@"])
+def test_a_message_about_a_network_camera_has_its_address_without_the_password(login: str) -> None:
+    address = f"rtsp://{login}127.0.0.1:9/stream"
+    film = FilmedSource(FilmCameraSettings(device=address, consent="we film"))
+    with pytest.raises(DeviceError, match=r"'rtsp://127.0.0.1:9/stream' cannot be") as raised:
+        film.begin()
+    film.close()
+    assert "s3cr" not in f"{raised.value}{raised.value.__cause__}"
+    assert "admin" not in str(raised.value)
+
+
 def test_a_device_that_is_not_there_is_named_with_what_to_do() -> None:
     film = FilmedSource(FilmCameraSettings(device="/dev/video-none", consent="we film"))
     with pytest.raises(DeviceError, match=r"'/dev/video-none' .*cannot be opened.*plug it in"):

@@ -1,7 +1,43 @@
 """Questions about how the YAML is written."""
 
+from collections.abc import Mapping
+
+from labcrane.protocol.pages import Language
 from labcrane.protocol.questions.question import Doubts, asks, key_of
 from labcrane.protocol.study import Study
+
+NAMED: Mapping[str, Mapping[Language, str]] = {
+    "camera": {
+        "en": "camera film video",
+        "de": "kamera film video",
+        "pl": "kamer film wideo",
+        "fr": "caméra film vidéo",
+        "es": "cámara film vídeo video",
+    },
+    "microphone": {
+        "en": "microphone voice sound audio",
+        "de": "mikrofon stimme ton audio",
+        "pl": "mikrofon głos dźwięk audio",
+        "fr": "micro voix son audio",
+        "es": "micrófono voz sonido audio",
+    },
+    "screen": {"en": "screen", "de": "bildschirm", "pl": "ekran", "fr": "écran", "es": "pantalla"},
+}
+"""Words of which a participant understands what is recorded, by kind and language."""
+
+
+@asks
+def _of_recordings(study: Study) -> Doubts:
+    """Question words of the consent text that do not say what is recorded."""
+    for name, chosen in study.recordings.items():
+        said = getattr(chosen.settings, "consent", "").casefold()
+        kinds = NAMED.get(chosen.name, {}).get(study.protocol.page.language, chosen.name).split()
+        if not any(word.casefold() in said for word in (name, *kinds)):
+            yield (
+                ("recordings", name, "consent"),
+                f"the words {said!r} name neither recording {name!r} nor what it is "
+                f"({', '.join(kinds)}), so that any consent text may contain them",
+            )
 
 
 @asks
