@@ -13,6 +13,9 @@ CAPTURED = "labcrane.capture."
 TERMS = ("clock", "arrival", "lag")
 """Terms of the uncertainty of a frame's time, as of :class:`labcrane.core.records.Captured`."""
 
+LEVEL = "level"
+"""What a film's signal is called: how bright its pictures are, or how loud its sound is."""
+
 CHANNELS = {"frame.number": "1", "file": "1", "pts": "s", **dict.fromkeys(TERMS, "s")}
 """Channels of these streams, with units; ``file`` is the number of the file."""
 

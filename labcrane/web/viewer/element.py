@@ -27,7 +27,7 @@ class Timeline(Element, component="viewer.js"):
         returns why it cannot be shown, or nothing.
     answers
         What answers each kind of question, called beside everything else: ``second``, ``lane``,
-        ``curve``, ``spectrogram`` and ``mark``.
+        ``curve``, ``spectrogram``, ``picture``, ``sound`` and ``mark``.
     """
 
     def __init__(

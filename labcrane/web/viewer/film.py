@@ -23,7 +23,9 @@ from labcrane.files.yaml import parse_yaml
 from labcrane.machines.links import link_boxes
 from labcrane.machines.machine import Machine
 from labcrane.protocol.components import ComponentSpec
+from labcrane.recording.films.footage import Footage, footage
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
+from labcrane.recording.pictures import CAPTURED, LEVEL
 from labcrane.registry.registry import Registry
 from labcrane.streams.context import situation_after
 from labcrane.types import FloatArray
@@ -266,14 +268,26 @@ class Film:
         return Glances(self._record, self.start)
 
     @cached_property
+    def footage(self) -> dict[str, Footage]:
+        """What was filmed, by the names of the recordings; their files are in the film's place."""
+        if self.place is None:
+            return {}
+        file, session = self.place
+        return footage(self._record.streams, file.absolute().parent, session)
+
+    @cached_property
     def unmeasured(self) -> list[tuple[str, str]]:
         """Gaze streams that are not shown, and why."""
         return unmeasured(self._record)
 
     @cached_property
     def signals(self) -> list[dict[str, str]]:
-        """Every signal that can be drawn: of the session, and of the streams of others."""
-        return [
+        """Every signal that can be drawn: of the session, of other streams, and levels of films."""
+        levels = [
+            {"stream": CAPTURED + name, "column": LEVEL, "unit": "1", "label": f"{name} {LEVEL}"}
+            for name in self.footage
+        ]
+        return levels + [
             {"stream": stream, "column": column, "unit": unit, "label": f"{stream} {column}"}
             for stream, each in self._record.streams.items()
             for column, unit in each.units.items()
@@ -339,6 +353,10 @@ class Film:
         if key not in self._curves:
             if len(self._curves) >= KEPT:
                 self._curves.popitem(last=False)
+            if column == LEVEL and stream.startswith(CAPTURED):
+                time, level = self.footage[stream.removeprefix(CAPTURED)].level()
+                self._curves[key] = time - self.start, level
+                return self._curves[key]
             source = self._record.streams[stream]
             values = source.column(column)
             if values.dtype.kind not in "fiub":  # texts have no curve

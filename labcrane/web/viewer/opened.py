@@ -41,7 +41,7 @@ def opened(path: Path, session: int, scratch: Path, say: Callable[[str], None]) 
         if not any(file.parent.glob(f"ses-{session:02d}_*.xdf")):
             raise
         why = str(error).partition("\n")[0]
-    journals = sorted(file.parent.glob(f"ses-{session:02d}_*"))
+    journals = sorted(file.parent.glob(f"ses-{session:02d}_*.xdf"))
     folder = scratch / file.stem
     folder.mkdir(parents=True, exist_ok=True)
     for journal in journals:

@@ -67,6 +67,14 @@ export default {
       <span class="view-swatch lost"></span>controls, feedback or a stream lost
       <span class="view-swatch mark"></span>your marks</p>
   </section>
+  <section v-if="about.filmed.length" class="room-card"><h2>Recordings</h2>
+    <div class="view-films"><figure v-for="name in about.filmed" :key="name">
+      <img v-if="films[name].src" :id="'film-' + name" :src="films[name].src" :data-at="films[name].at" :alt="'picture of ' + name">
+      <label v-if="films[name].sound" class="room-field"><input type="checkbox" :id="'hear-' + name" @change="hear(name)"> Hear it</label>
+      <audio :id="'sound-' + name"></audio>
+      <p v-if="films[name].said" :id="'film-said-' + name" class="view-none">{{ films[name].said }}</p>
+      <figcaption class="room-faint">{{ name }}{{ films[name].since === undefined ? '' : ', frame of second ' + films[name].since.toFixed(3) }}</figcaption></figure></div>
+  </section>
   <section v-if="about.gaze" class="room-card"><h2>Gaze</h2>
     <p id="looked"><strong>{{ glance.looked || 'no area' }}</strong> <span class="room-faint">is looked at, in the latest picture of the view; the display's delay is not subtracted</span></p>
     <svg id="gaze" class="view-gaze" :viewBox="picture" role="img" :aria-label="'gaze, at ' + (glance.looked || 'no area')">
@@ -101,7 +109,7 @@ export default {
 </div>`,
   props: { about: Object },
   data() {
-    return { open: {}, next: {}, why: "", glance: { areas: [], trail: [], looked: "" }, extent: { width: 1, height: 1 }, lane: { names: [], begin: 0, end: 1 }, words: "", from: null, marks: this.about.marks, markSaid: this.about.markSaid, t: 0, speed: 1, span: 0, playing: false, find: "", came: 0, asked: 0,
+    return { open: {}, next: {}, films: Object.fromEntries(this.about.filmed.map((name) => [name, {}])), heard: {}, why: "", glance: { areas: [], trail: [], looked: "" }, extent: { width: 1, height: 1 }, lane: { names: [], begin: 0, end: 1 }, words: "", from: null, marks: this.about.marks, markSaid: this.about.markSaid, t: 0, speed: 1, span: 0, playing: false, find: "", came: 0, asked: 0,
       charts: [0, 1, 2].map(() => ({ signal: "", option: null, said: "", as: "curve", heard: "", values: null, begin: 0, end: 1 })) };
   },
   computed: {
@@ -190,7 +198,9 @@ export default {
     take(asked, found, outdated) {
       if (asked.kind === "mark") this.marked(found);
       else if (asked.kind === "second") { if (this.about.gaze) this.glanced(found); }
+      else if (asked.kind === "picture") this.films[asked.name] = { ...found, at: asked.t };
       else if (outdated) return;
+      else if (asked.kind === "sound") this.sounds(asked, found);
       else if (asked.kind === "lane") this.lane = { names: found.lane, begin: asked.begin, end: asked.end };
       else this.curve(asked, found);
     },
@@ -198,14 +208,37 @@ export default {
       const before = this.begin;
       this.t = Math.min(Math.max(0, t || 0), this.about.length);
       this.question("second", { kind: "second", t: this.t });
+      for (const name of this.about.filmed) this.question(`film ${name}`, { kind: "picture", name, t: this.t });
       if (this.begin !== before) this.askSoon();
     },
     step() {
       const now = performance.now(), passed = (now - this.came) / 1000;
       this.came = now;
+      this.listen();
       if (!this.playing) return;
       if (this.t >= this.about.length) { this.playing = false; return; }
       this.go(this.t + passed * this.speed);
+    },
+    hear(name) {
+      if (name in this.heard) { document.getElementById(`sound-${name}`).pause(); delete this.heard[name]; }
+      else this.heard[name] = NaN; // no piece of sound yet
+    },
+    listen() { // what is played is heard, a piece at a time
+      for (const name in this.heard) {
+        const player = document.getElementById(`sound-${name}`), at = this.t - this.heard[name], key = `sound ${name}`;
+        if (!this.playing || this.speed < 0.25 || this.speed > 5) player.pause();
+        else if (!(at >= 0 && at < this.about.soundLasts)) { if (!this.open[key]) this.question(key, { kind: "sound", name, t: this.t }); }
+        else {
+          player.playbackRate = this.speed;
+          if (Math.abs(player.currentTime - at) > 0.1) player.currentTime = at;
+          player.play().catch(() => {}); // it is asked to play at each step
+        }
+      }
+    },
+    sounds({ name, t }, { src }) {
+      if (!(name in this.heard)) return;
+      document.getElementById(`sound-${name}`).src = src;
+      this.heard[name] = t;
     },
     play() { this.playing = !this.playing; if (this.playing && this.t >= this.about.length) this.go(0); },
     trial(way) {

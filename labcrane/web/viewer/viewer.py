@@ -1,6 +1,7 @@
 """Viewer's page: the machine as it was recorded, with its timeline and its signals."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,10 @@ from labcrane.web.server.serving import AWAY_S, build_pages, serve_here
 from labcrane.web.viewer.film import Film
 from labcrane.web.viewer.glances import Glances
 from labcrane.web.viewer.marks import Marks
+from labcrane.web.viewer.pictures import SOUND_S, picture, sound
 
 HERE = Path(__file__).parent
+
 
 Asked = Mapping[str, Any]
 Answer = Callable[[Asked], Asked]
@@ -94,6 +97,8 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
         "signals": first.signals,
         **marks.shown(),
         "gaze": glances.known,
+        "filmed": list(first.footage),
+        "soundLasts": SOUND_S,
     }
     line = Timeline(about, show, _answers(first, marks, glances))
     with line.add_slot("machine"):
@@ -138,6 +143,7 @@ def _answers(film: Film, marks: Marks, glances: Glances) -> dict[str, Answer]:
 
     answers: dict[str, Answer] = {"curve": curve, "spectrogram": spectrogram, "second": second}
     answers |= {"lane": lane, "mark": marks.asked}
+    answers |= {"picture": partial(picture, film), "sound": partial(sound, film)}
     return {kind: told(answer) for kind, answer in answers.items()}
 
 

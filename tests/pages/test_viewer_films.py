@@ -1,0 +1,152 @@
+"""Films in the viewer: the picture shown is the frame that stands at the time shown."""
+
+import random
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import av
+import h5py
+import numpy as np
+import pytest
+from faults.sessions import labcrane, wait_for
+from faults.test_filmed_session import STUDY, WHO, filming, size
+from pages.looks import check
+from pages.room import shown, text
+from pages.test_viewer import GO, reached
+from selenium import webdriver
+from selenium.webdriver.common.by import By
+
+BLOCK, BITS = 16, 12
+TESTED = "testsrc2=size=160x120:rate=30"
+BARS = (
+    f"color=size={BLOCK * BITS}x32:rate=30,"
+    f"geq=lum='if(bitand(N,pow(2,floor(X/{BLOCK}))),255,0)':cb=128:cr=128"
+)
+"""The number of each frame, as black and white blocks."""
+
+NUMBER = f"""
+const [at, name] = arguments, image = document.getElementById('film-' + name);
+if (!image || Number(image.dataset.at) !== at || !image.complete) return null;
+const canvas = document.createElement('canvas');
+canvas.width = image.naturalWidth; canvas.height = image.naturalHeight;
+const paint = canvas.getContext('2d');
+paint.drawImage(image, 0, 0);
+let number = 0;
+for (let bit = 0; bit < {BITS}; bit++)
+    if (paint.getImageData(bit * {BLOCK} + 8, 16, 1, 1).data[0] > 128) number += 2 ** bit;
+return number;
+"""
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A session whose camera sends numbered pictures and is killed once."""
+    folder = tmp_path_factory.mktemp("filmed")
+    protocol, data = folder / "study.yaml", folder / "data"
+    assert TESTED in STUDY
+    protocol.write_text(STUDY.replace(TESTED, BARS))
+    launcher = labcrane("run", protocol, *WHO, data)
+    there = data / "P001-SIMULATED"
+    wait_for(lambda: size(there / "ses-01_run.xdf") > 300_000)
+    wait_for(lambda: size(there / "ses-01_face.mkv") > 0)
+    filming(launcher, "face").kill()
+    said = launcher.communicate(timeout=240)[0]
+    assert launcher.returncode == 0, said
+    return there / f"{there.name}.h5"
+
+
+@contextmanager
+def viewing(file: Path, browser: webdriver.Chrome, *words: str) -> Iterator[None]:
+    command = [sys.executable, "-m", "labcrane", "view", str(file), *words]
+    viewer = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        link = next(line for line in viewer.stdout if line.startswith("viewer: ")).split()[1]
+        wait_for(lambda: reached(browser, link))
+        shown(browser, "clock", "of 0:00:")
+        yield
+    finally:
+        viewer.terminate()
+        viewer.wait(240)
+        viewer.stdout.close()
+
+
+def numbers(path: Path) -> dict[int, int]:
+    """Return the number that each frame of a film shows, by its place in milliseconds."""
+    with av.open(str(path)) as film:
+        found = {}
+        for frame in film.decode(0):
+            grey = frame.to_ndarray(format="gray")[16, BLOCK // 2 :: BLOCK]
+            number = sum(1 << bit for bit, level in enumerate(grey) if level > 128)
+            found[round(1000 * frame.time)] = number
+    return found
+
+
+@pytest.mark.slow
+def test_the_picture_shown_is_the_frame_at_the_time_shown(
+    file: Path, browser: webdriver.Chrome
+) -> None:
+    with h5py.File(file) as opened:
+        session = opened["ses-01"]
+        loop, stream = session["time"][:], session["streams/labcrane.capture.face"]
+        time_s, columns = stream["time"][:], stream["data"]
+        kept = {each: columns[each][:] for each in ("file", "pts", "frame.number")}
+    films = {n: numbers(file.parent / f"ses-01_face{('', '.2')[n - 1]}.mkv") for n in (1, 2)}
+    dice, pictures, gaps = random.Random(76), 0, 0
+    with viewing(file, browser):
+        (at,) = np.flatnonzero(np.diff(kept["file"]))
+        within = 0.5 * (time_s[at] + time_s[at + 1]) - loop[0]
+        times = [dice.uniform(0.0, loop[-1] - loop[0]) for _ in range(55)]
+        for second in [within, *times]:
+            browser.execute_script(GO, second)
+            row = int(np.flatnonzero(time_s <= loop[0] + second)[-1])
+            follows = row + 1 < len(time_s) and kept["file"][row + 1] == kept["file"][row]
+            follows &= kept["frame.number"][row + 1 : row + 2] == kept["frame.number"][row] + 1
+            if not follows and loop[0] + second - time_s[row] > 0.05:
+                gaps += 1
+                wait_for(lambda: text(browser, "film-said-face").startswith("no frame"))
+                assert not browser.execute_script("return document.getElementById('film-face')")
+                continue
+            wanted = films[int(kept["file"][row])][round(1000 * kept["pts"][row])]
+            wait_for(lambda s=second, n=wanted: browser.execute_script(NUMBER, s, "face") == n)
+            pictures += 1
+        assert pictures >= 50 or gaps > 5
+        assert gaps
+        check(browser, "viewer with films")
+
+
+@pytest.mark.slow
+def test_sound_is_played_with_the_time_that_is_shown(file: Path, browser: webdriver.Chrome) -> None:
+    apart = """
+    const player = document.getElementById('sound-room');
+    const t = Number(document.getElementById('scrub').value);
+    return player.duration && !player.paused ? [player.currentTime, t] : null;
+    """
+    with viewing(file, browser, "--at", "1"):
+        wait_for(lambda: browser.execute_script("return document.getElementById('hear-room')"))
+        for ident in ("hear-room", "play"):  # by hand: else a browser plays nothing
+            browser.find_element(By.ID, ident).click()
+        found: list[list[float]] = []
+
+        def heard() -> bool:
+            found.extend([both] if (both := browser.execute_script(apart)) else [])
+            return len(found) > 30
+
+        wait_for(heard, 60.0)
+        offset = np.subtract(*np.array(found[5:]).T)  # once it has begun
+        assert np.ptp(offset) < 0.2
+
+
+@pytest.mark.slow
+def test_without_the_file_the_viewer_says_why_there_is_no_picture(
+    file: Path, browser: webdriver.Chrome
+) -> None:
+    gone = file.with_name("ses-01_face.mkv")
+    gone.rename(file.with_name("elsewhere"))
+    try:
+        with viewing(file, browser, "--at", "0.5"):
+            wait_for(lambda: "face: file 1 is missing" in text(browser, "film-said-face"))
+    finally:
+        file.with_name("elsewhere").rename(gone)
