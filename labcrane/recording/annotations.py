@@ -26,8 +26,8 @@ from labcrane.limits import LIMITS, LimitError, check_text
 PATIENCE_S = 5.0
 """How long an annotation waits while another one is written, in seconds."""
 
-COLUMNS = ("time", "until", "text", "written")
-"""Columns of every annotation: two times in seconds, and two texts."""
+COLUMNS = ("time", "until", "text", "written", "coder")
+"""Columns of every annotation: two times in seconds, and three texts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +46,8 @@ class Annotation:
         When it was made, by the computer's calendar: ``2026-03-05T14:07:31+01:00``.
     number
         Which line of the file it is, from 1.
+    coder
+        Who made it, by the coder's own abbreviation; empty where it was not given.
     """
 
     time: float
@@ -53,6 +55,7 @@ class Annotation:
     text: str
     written: str
     number: int
+    coder: str = ""
 
 
 def annotations_path(folder: Path, session: int) -> Path:
@@ -91,7 +94,12 @@ def read_annotations(folder: Path, session: int) -> list[Annotation]:
 
 
 def annotate(
-    recording: Path, session: int, time: float, text: str, until: float | None = None
+    recording: Path,
+    session: int,
+    time: float,
+    text: str,
+    until: float | None = None,
+    coder: str = "",
 ) -> Annotation:
     """Add a mark to a session.
 
@@ -101,6 +109,8 @@ def annotate(
         The participant file, in its place in the data folder; it is not opened.
     time, until
         From when to when, in seconds on the session's clock; a moment without ``until``.
+    coder
+        Who makes it.
 
     Raises
     ------
@@ -111,6 +121,7 @@ def annotate(
         raise RecordingError("an annotation cannot be empty; describe what it marks")
     try:
         check_text(text, "note")
+        check_text(coder, "note")
     except LimitError as error:
         raise RecordingError(f"an annotation is a note, and {error}") from error
     end = time if until is None else until
@@ -120,6 +131,7 @@ def annotate(
             "is not before it"
         )
     said = {"time": time, "until": end, "text": text.strip(), "written": _now()}
+    said |= {"coder": coder.strip()} if coder.strip() else {}
     number = _append(recording, session, said)
     return _annotation(said, number)
 
@@ -210,7 +222,7 @@ def _annotation(said: dict[str, Any], number: int) -> Annotation:
     text, written = str(said["text"]), str(said["written"])
     if not (math.isfinite(time) and math.isfinite(until)) or len(text) > LIMITS["note"].most:
         raise ValueError(f"a time of {time} to {until} s, with {len(text)} characters")
-    return Annotation(time, until, text, written, number)
+    return Annotation(time, until, text, written, number, str(said.get("coder", "")))
 
 
 def _now() -> str:

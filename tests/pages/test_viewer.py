@@ -428,6 +428,11 @@ def test_two_trials_are_shown_from_their_starts_side_by_side(file: Path, film: F
     assert film.start_of(other) - film.start_of(one) == pytest.approx(apart_s, abs=1e-3)
     with pytest.raises(RecordingError, match=r"has no trial 9; there are 2 to 3"):
         film.start_of(9)
+    begun = open_recording(file).session(1).events.set_index("name")["time"]["trial.start"]
+    assert film.time_of("trial.start") == pytest.approx(begun.iloc[0] - film.start)
+    assert film.time_of("2.5") == 2.5
+    with pytest.raises(RecordingError, match=r"did you mean 'trial\.start'"):
+        film.time_of("trial.strat")
     with pytest.raises(RecordingError, match="no trial 7"):
         check_view(file, "--trial", f"{one:g}", "--beside-trial", "7")
     assert main(["view", str(file), "--beside-trial", "2"]) == 2

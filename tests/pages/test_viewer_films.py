@@ -1,6 +1,7 @@
 """Films in the viewer: the picture shown is the frame that stands at the time shown."""
 
 import random
+import stat
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -18,6 +19,9 @@ from pages.room import shown, text
 from pages.test_viewer import GO, reached
 from selenium import webdriver
 from selenium.webdriver.common.by import By
+
+from labcrane import ProtocolError, open_recording
+from labcrane.web.viewer.codes import read_codes
 
 BLOCK, BITS = 16, 12
 TESTED = "testsrc2=size=160x120:rate=30"
@@ -150,3 +154,66 @@ def test_without_the_file_the_viewer_says_why_there_is_no_picture(
             wait_for(lambda: "face: file 1 is missing" in text(browser, "film-said-face"))
     finally:
         file.with_name("elsewhere").rename(gone)
+
+
+CODES = """\
+g: {name: looks away, lasts: true}
+s: {name: slip}
+"""
+
+
+@pytest.mark.slow
+def test_behaviour_is_coded_by_keys_and_saved_at_once(
+    file: Path, browser: webdriver.Chrome, tmp_path: Path
+) -> None:
+    codes = tmp_path / "codes.yaml"
+    codes.write_text(CODES)
+    record = open_recording(file).session(1)
+    begun = record.events.set_index("name")["time"]["trial.start"].iloc[0]
+    zero = record.streams["loop"].time[0]
+
+    def coded() -> list[tuple[object, ...]]:
+        kept = record.annotations
+        return [
+            (round(time - zero, 3), round(until - zero, 3), text, coder)
+            for time, until, text, _, coder in kept.itertuples(index=False, name=None)
+        ]
+
+    words = ("--at", "trial.start", "--codes", str(codes), "--coder", "AB")
+    with viewing(file, browser, *words):
+        at = "return Number(document.getElementById('second').value)"
+        wait_for(lambda: abs(browser.execute_script(at) - (begun - zero)) < 0.006)
+        page = browser.find_element(By.TAG_NAME, "body")
+        browser.execute_script(GO, 2.0)
+        page.send_keys("g")
+        wait_for(lambda: coded() == [(2.0, 2.0, "looks away", "AB")])
+        wait_for(lambda: "since 0:00:02" in text(browser, "code-g"))
+        browser.execute_script(GO, 3.0)
+        page.send_keys("s")
+        browser.execute_script(GO, 3.5)
+        page.send_keys("g")
+        whole = [(2.0, 3.5, "looks away", "AB"), (3.0, 3.0, "slip", "AB")]
+        wait_for(lambda: coded() == whole)
+        for ident, word in (("code-key", "x"), ("code-name", "points")):
+            browser.find_element(By.ID, ident).send_keys(word)
+        browser.find_element(By.ID, "code-add").click()
+        browser.execute_script(GO, 4.0)
+        page.send_keys("x")
+        wait_for(lambda: coded() == [*whole, (4.0, 4.0, "points", "AB")])
+        check(browser, "viewer with codes")
+    (kept,) = file.parent.glob("*_annotations.jsonl")
+    assert stat.S_IMODE(kept.stat().st_mode) == stat.S_IMODE(file.stat().st_mode)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [("m: {name: x}", "the viewer has keys"), ("gg: {name: x}", "not a scheme"),
+     ("g: {name: x, last: 1}", "not a scheme"), ("- g", "not a scheme")],
+)  # fmt: skip
+def test_a_scheme_that_cannot_be_used_is_refused(text: str, why: str, tmp_path: Path) -> None:
+    path = tmp_path / "codes.yaml"
+    path.write_text(text)
+    with pytest.raises(ProtocolError, match=why):
+        read_codes(path)
+    path.write_text(CODES)
+    assert read_codes(path)[1] == {"key": "s", "name": "slip", "lasts": False}

@@ -3,13 +3,14 @@
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Participant
+from labcrane.recording.annotations import COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
 def annotations_of(participant: Participant) -> "pd.DataFrame":
-    """Return one row per mark: participant, session, time, until, text and written.
+    """Return one row per mark: participant, session, time, until, text, written and coder.
 
     ``time`` and ``until`` are in seconds on the session's clock, as everywhere; ``at`` is in
     seconds from the session's first frame, as the viewer shows it.
@@ -30,5 +31,5 @@ def annotations_of(participant: Participant) -> "pd.DataFrame":
             marks.insert(1, "session", number)
             marks.insert(2, "at", marks["time"] - zero)
             tables.append(marks)
-    columns = ["participant", "session", "at", "time", "until", "text", "written"]
+    columns = ["participant", "session", "at", *COLUMNS]
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=columns)

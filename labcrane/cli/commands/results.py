@@ -311,7 +311,11 @@ def view(
     beside: Annotated[
         Path | None, typer.Option(help="another participant file, shown in parallel")
     ] = None,
-    at: Annotated[float, typer.Option(help="second to start at")] = 0.0,
+    at: Annotated[str, typer.Option(help="second to start at, or an event: target.entered")] = "0",
+    codes: Annotated[
+        Path | None, typer.Option(help="YAML file with keys that annotate what is seen")
+    ] = None,
+    coder: Annotated[str, typer.Option(help="abbreviation of who annotates")] = "",
     trial: Annotated[
         int | None, typer.Option(help="start at this trial, by its number in the trial table")
     ] = None,
@@ -331,6 +335,7 @@ def view(
     from labcrane.recording.paths import participant_path
     from labcrane.web.handle import free_port
     from labcrane.web.server.serving import HOST
+    from labcrane.web.viewer.codes import Opening, read_codes
     from labcrane.web.viewer.film import Film
     from labcrane.web.viewer.opened import opened
     from labcrane.web.viewer.viewer import serve
@@ -340,6 +345,7 @@ def view(
     def say(line: str) -> None:
         out.print(line, markup=False)
 
+    scheme = read_codes(codes) if codes else ()
     if beside_trial is not None and trial is None:
         raise ProtocolError("--beside-trial needs --trial; add it")
     paths = [recording, *([beside or recording] if beside or beside_trial is not None else [])]
@@ -352,14 +358,13 @@ def view(
             )
             for number, path in enumerate(paths)
         ]
-        if trial is not None:
-            at = films[0].start_of(trial)
+        second = films[0].time_of(at) if trial is None else films[0].start_of(trial)
         if beside_trial is not None:
-            films[1].shift = films[1].start_of(beside_trial) - at
+            films[1].shift = films[1].start_of(beside_trial) - second
             films[0].called += f", trial {trial}"
             films[1].called += f", trial {beside_trial}"
         say("Ctrl-C ends it")
-        serve(films, discover(), free_port(HOST, port), at, say)
+        serve(films, discover(), free_port(HOST, port), Opening(second, coder, scheme), say)
 
 
 def _write_measures(recording: Path, session: int, frames: "Groups", path: Path) -> None:

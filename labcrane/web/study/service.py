@@ -17,6 +17,7 @@ from labcrane.web.server.access import STUDY
 from labcrane.web.server.serving import AWAY_S, build_pages, serve_here
 from labcrane.web.study.overview import Reader, newest_report
 from labcrane.web.study.study_page import page_of
+from labcrane.web.viewer.codes import Opening
 from labcrane.web.viewer.film import Film
 from labcrane.web.viewer.opened import opened
 
@@ -81,7 +82,7 @@ def _routes(app: Any, reader: Reader, registry: Callable[[], Registry], scratch:
         except (LabcraneError, *DAMAGED) as error:
             ui.label(f"{person}, session {session} cannot be shown: {error}").props("role=alert")
             return
-        viewer_page(films, registry(), 0.0)
+        viewer_page(films, registry(), Opening())
 
 
 def _film(data: Path, person: str, session: int, scratch: Path) -> Film:

@@ -6,6 +6,7 @@ one that is drawn, and only while it is summed up.
 
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from threading import Lock
@@ -18,7 +19,7 @@ from labcrane.core.records import Event, Run, SessionState
 from labcrane.core.roles import Cue, Feedback
 from labcrane.core.signals import Layout, signals_of
 from labcrane.design.counts import TrialCounts
-from labcrane.errors import LabcraneError, RecordingError
+from labcrane.errors import LabcraneError, RecordingError, suggestion
 from labcrane.files.yaml import parse_yaml
 from labcrane.machines.links import link_boxes
 from labcrane.machines.machine import Machine
@@ -226,6 +227,22 @@ class Film:
             known = f"{there[0]} to {there[-1]}" if there else "none"
             raise RecordingError(f"{self.called} has no trial {trial}; there are {known}")
         return float(begun[-1])
+
+    def time_of(self, place: str) -> float:
+        """Return the second that is meant: a number, or the first event of a name.
+
+        Raises
+        ------
+        RecordingError
+            It is neither.
+        """
+        with suppress(ValueError):
+            return float(place)
+        times = [event.time for event in self._happened if event.name == place]
+        if not times:
+            names = sorted({event.name for event in self._happened})
+            raise RecordingError(f"{self.called}: {suggestion(place, names, 'its events are')}")
+        return times[0] - self.start
 
     @cached_property
     def gaps(self) -> list[tuple[float, float]]:

@@ -29,7 +29,8 @@ class Marks:
             return {"marks": [], "markSaid": str(error), "marking": True}
         marks = [
             {"t": round(mark.time - self._start, 4), "to": round(mark.until - self._start, 4),
-             "text": mark.text, "written": mark.written, "number": mark.number}
+             "text": mark.text, "written": mark.written, "number": mark.number,
+             "coder": mark.coder}
             for mark in found
         ]  # fmt: skip
         return {"marks": marks, "markSaid": said, "marking": True}
@@ -40,11 +41,14 @@ class Marks:
             return self.shown()
         file, session = self._place
         try:
-            if "withdraw" in asked:
+            if "text" not in asked:
                 withdraw(file, session, int(asked["withdraw"]))
                 return self.shown("withdrawn; the file keeps the original")
-            begin, end = float(asked["t"]), float(asked["to"])
-            annotate(file, session, self._start + begin, str(asked["text"]), self._start + end)
+            begin, end = (self._start + float(asked[name]) for name in ("t", "to"))
+            text, coder = str(asked["text"]), str(asked.get("coder", ""))
+            made = annotate(file, session, begin, text, end, coder)
+            if "withdraw" in asked:  # what has ended replaces what began
+                withdraw(file, session, int(asked["withdraw"]))
         except (LabcraneError, LookupError, TypeError, ValueError) as error:
             return self.shown(f"not kept: {error}")
-        return self.shown("kept")
+        return self.shown("kept") | {"made": made.number}

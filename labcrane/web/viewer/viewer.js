@@ -93,11 +93,19 @@ export default {
       <button type="button" class="room-button" id="mark-from" :aria-pressed="from !== null" @click="from = from === null ? t : null">{{ from === null ? 'Begin here' : 'Begins at ' + clock(from) }}</button>
       <button type="submit" class="room-button" id="mark-add" :disabled="!words.trim()">{{ from === null ? 'Annotate this moment' : 'Annotate until here' }}</button>
     </form>
+    <form class="view-controls" @submit.prevent="define()">
+      <label class="room-field">Coder <input id="coder" v-model="coder" maxlength="40" autocomplete="off" size="6"></label>
+      <button v-for="one in codes" :key="one.key" type="button" class="room-button" :id="'code-' + one.key" :aria-pressed="one.key in lasting" @click="coded(one.key)">{{ one.name }}{{ one.key in lasting ? ' since ' + clock(lasting[one.key].t) : '' }} <kbd aria-hidden="true">{{ one.key }}</kbd></button>
+      <label class="room-field">Key <input id="code-key" v-model="fresh.key" maxlength="1" size="1" autocomplete="off"></label>
+      <label class="room-field">annotates <input id="code-name" v-model="fresh.name" maxlength="200" autocomplete="off"></label>
+      <label class="room-field"><input type="checkbox" id="code-lasts" v-model="fresh.lasts"> lasts until it is pressed again</label>
+      <button type="submit" class="room-button" id="code-add" :disabled="!free()">Add key</button>
+    </form>
     <p id="mark-said" role="status" :class="markSaid.startsWith('not kept') ? 'room-question' : 'room-faint'">{{ markSaid }}</p>
     <div id="marks" class="room-scroll" tabindex="0" role="group" aria-label="Annotations">
       <p v-if="!marks.length" class="room-faint">None yet. Go to a moment, press M, and describe what you see.</p>
       <div v-for="m in marks" :key="m.number" class="view-marked">
-        <button type="button" class="view-event" @click="go(m.t)"><span>{{ clock(m.t) }}{{ m.to > m.t ? ' to ' + clock(m.to) : '' }}</span> {{ m.text }}</button>
+        <button type="button" class="view-event" @click="go(m.t)"><span>{{ clock(m.t) }}{{ m.to > m.t ? ' to ' + clock(m.to) : '' }}</span> {{ m.text }}{{ m.coder ? ' (' + m.coder + ')' : '' }}</button>
         <button type="button" class="room-button" :aria-label="'Withdraw: ' + m.text" @click="withdraw(m)">Withdraw</button></div></div>
   </section>
   <section class="room-card"><h2>Events</h2>
@@ -109,7 +117,7 @@ export default {
 </div>`,
   props: { about: Object },
   data() {
-    return { open: {}, next: {}, films: Object.fromEntries(this.about.filmed.map((name) => [name, {}])), heard: {}, why: "", glance: { areas: [], trail: [], looked: "" }, extent: { width: 1, height: 1 }, lane: { names: [], begin: 0, end: 1 }, words: "", from: null, marks: this.about.marks, markSaid: this.about.markSaid, t: 0, speed: 1, span: 0, playing: false, find: "", came: 0, asked: 0,
+    return { open: {}, next: {}, films: Object.fromEntries(this.about.filmed.map((name) => [name, {}])), heard: {}, codes: [...this.about.codes], coder: this.about.coder, lasting: {}, fresh: { key: "", name: "", lasts: false }, why: "", glance: { areas: [], trail: [], looked: "" }, extent: { width: 1, height: 1 }, lane: { names: [], begin: 0, end: 1 }, words: "", from: null, marks: this.about.marks, markSaid: this.about.markSaid, t: 0, speed: 1, span: 0, playing: false, find: "", came: 0, asked: 0,
       charts: [0, 1, 2].map(() => ({ signal: "", option: null, said: "", as: "curve", heard: "", values: null, begin: 0, end: 1 })) };
   },
   computed: {
@@ -196,7 +204,7 @@ export default {
       if (found.failed === undefined) this.take(asked, found, Boolean(next));
     },
     take(asked, found, outdated) {
-      if (asked.kind === "mark") this.marked(found);
+      if (asked.kind === "mark") this.marked(asked, found);
       else if (asked.kind === "second") { if (this.about.gaze) this.glanced(found); }
       else if (asked.kind === "picture") this.films[asked.name] = { ...found, at: asked.t };
       else if (outdated) return;
@@ -258,14 +266,37 @@ export default {
     mark() {
       if (!this.words.trim()) return;
       const other = this.from === null ? this.t : this.from;
-      this.change({ t: Math.min(other, this.t), to: Math.max(other, this.t), text: this.words });
+      this.change({ t: Math.min(other, this.t), to: Math.max(other, this.t), text: this.words, coder: this.coder });
+    },
+    free() {
+      const { key, name } = this.fresh;
+      return key && name.trim() && !this.about.taken.includes(key) && !this.codes.some((one) => one.key === key);
+    },
+    define() {
+      if (!this.free()) return;
+      this.codes.push({ ...this.fresh });
+      this.fresh = { key: "", name: "", lasts: false };
+    },
+    coded(key) { // a moment; of what lasts, the beginning is saved at once, and replaced when it ends
+      const { name, lasts } = this.codes.find((one) => one.key === key), begun = this.lasting[key];
+      const said = { t: this.t, to: this.t, text: name, coder: this.coder };
+      if (begun && begun.number === null) return; // its beginning is not saved yet
+      if (begun) {
+        delete this.lasting[key];
+        this.change({ ...said, t: Math.min(begun.t, this.t), to: Math.max(begun.t, this.t), withdraw: begun.number });
+      } else if (lasts) {
+        this.lasting[key] = { t: this.t, number: null };
+        this.change({ ...said, begins: key });
+      } else this.change(said);
     },
     withdraw(mark) { this.change({ withdraw: mark.number }); },
     change(what) { this.question(`mark ${this.asked}`, { kind: "mark", ...what }); }, // none replaces another
-    marked({ marks, markSaid }) { // what was written stays until it is kept
+    marked({ begins, text }, { marks, markSaid, made }) { // what was written stays until it is kept
+      if (begins && made) this.lasting[begins].number = made;
+      else if (begins) delete this.lasting[begins];
       this.marks = marks;
       this.markSaid = markSaid;
-      if (markSaid === "kept") { this.words = ""; this.from = null; }
+      if (markSaid === "kept" && text === this.words) { this.words = ""; this.from = null; }
     },
     askSoon() { this.soon ??= setTimeout(() => { this.soon = null; this.askAll(); }, SOON_MS); }, // also while it plays
     askAll() {
@@ -331,7 +362,10 @@ export default {
       chart.said = known.length ? `${short(Math.min(...known))} to ${short(Math.max(...known))} ${named}` : "no value here";
     },
     key(e) {
-      if (e.ctrlKey || e.altKey || e.metaKey || ["INPUT", "SELECT", "BUTTON"].includes(e.target.tagName)) return;
+      const typed = e.target.tagName === "SELECT" || (e.target.tagName === "INPUT" && !["checkbox", "range"].includes(e.target.type));
+      if (e.ctrlKey || e.altKey || e.metaKey || typed) return;
+      if (this.codes.some((one) => one.key === e.key)) { if (!e.repeat && this.about.marking) this.coded(e.key); e.preventDefault(); return; }
+      if (["INPUT", "BUTTON"].includes(e.target.tagName)) return;
       const far = e.shiftKey ? 10 : 1;
       const does = { " ": () => this.play(), ArrowRight: () => this.go(this.t + far), ArrowLeft: () => this.go(this.t - far),
         ".": () => this.go(this.t + 1 / this.about.rate), ",": () => this.go(this.t - 1 / this.about.rate),

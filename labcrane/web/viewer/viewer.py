@@ -13,6 +13,7 @@ from labcrane.web.page import PRIMARY, prepare
 from labcrane.web.scene import MachineScene, camera_buttons
 from labcrane.web.server.access import VIEWER
 from labcrane.web.server.serving import AWAY_S, build_pages, serve_here
+from labcrane.web.viewer.codes import TAKEN, Opening
 from labcrane.web.viewer.film import Film
 from labcrane.web.viewer.glances import Glances
 from labcrane.web.viewer.marks import Marks
@@ -52,7 +53,7 @@ class Screen:
         self._scene.show(frame, self._shapes.shapes(frame), things)
 
 
-def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
+def viewer_page(films: Sequence[Film], registry: Registry, opening: Opening) -> None:
     """Build the page: one machine for each film, side by side at the same second."""
     from nicegui import ui  # noqa: PLC0415
 
@@ -89,7 +90,10 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
         "lacking": lacking,
         "length": first.length,
         "rate": first.run.rate_hz,
-        "at": at,
+        "at": opening.at,
+        "coder": opening.coder,
+        "codes": list(opening.codes),
+        "taken": TAKEN,
         "trials": first.trials,
         "events": first.events,
         "gaps": first.gaps,
@@ -148,7 +152,11 @@ def _answers(film: Film, marks: Marks, glances: Glances) -> dict[str, Answer]:
 
 
 def serve(
-    films: Sequence[Film], registry: Registry, port: int, at: float, say: Callable[[str], None]
+    films: Sequence[Film],
+    registry: Registry,
+    port: int,
+    opening: Opening,
+    say: Callable[[str], None],
 ) -> None:
     """Serve the viewer to this computer until it is interrupted; ``say`` receives its link."""
     from fastapi import FastAPI  # noqa: PLC0415
@@ -158,7 +166,7 @@ def serve(
 
     @ui.page("/viewer", reconnect_timeout=AWAY_S)
     def viewer() -> None:
-        viewer_page(films, registry, at)
+        viewer_page(films, registry, opening)
 
     build_pages(app)
     serve_here(app, VIEWER, port, say)
