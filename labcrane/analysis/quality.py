@@ -92,7 +92,8 @@ def loop_backs(participant: Participant) -> "pd.DataFrame":
     """Return what photodiodes and microphones showed of the streams that recorded them.
 
     Milliseconds: delay of the sensor after the picture or sound, by how much it grew from the first
-    third of the session to the last, and the uncertainty of the stream's times at 95 %.
+    third of the session to the last, the uncertainty of the stream's times at 95 %, and the lag of
+    a camera or microphone that is declared.
     """
     import pandas as pd
 
@@ -103,6 +104,7 @@ def loop_backs(participant: Participant) -> "pd.DataFrame":
             times = {"delay": "mean_s", "delay_sd": "sd_s"}
             known = {name: delay.get(key) for name, key in times.items()}
             known |= {"growth": one["moved_s"], "stated": one["stated_s"]}
+            known["declared_lag"] = one.get("declared_s")
             rows.append(
                 {
                     "participant": participant.name,

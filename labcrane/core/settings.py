@@ -7,7 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, TypeVar
 
-from pydantic import AfterValidator, BaseModel, Field, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    Field,
+    NonNegativeInt,
+    PositiveInt,
+    ValidationInfo,
+)
 
 from labcrane.core.references import Reference
 from labcrane.errors import look as look  # noqa: PLC0414 - public here
@@ -119,6 +126,14 @@ class CaptureSettings(Settings):
     consent: str = Field(min_length=1)
     """The words of the consent text that name this recording: ``We film your face``. A study is not
     approved with a consent text that does not contain them."""
+
+    sees: str | None = None
+    """The view that a camera sees, or the sound or vibration that a microphone hears: the sync
+    report states how late each change of it is in the recording."""
+
+    sees_part: tuple[NonNegativeInt, NonNegativeInt, PositiveInt, PositiveInt] | None = None
+    """Left, top, width and height, in pixels of the picture, of what changes there: the view's
+    patch. The whole picture by default."""
 
     required: bool = True
     """Whether a session waits for it. If it fails later, the session pauses as for a required

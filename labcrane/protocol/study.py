@@ -254,19 +254,24 @@ class Checker:
         """Note sensors at a view or sound that there is not, or at a view without a patch."""
         views = self._protocol.views
         shown = [*self._protocol.feedback, *views]
-        for label, need in self._protocol.streams.items():
-            for channel, of in need.sees.items():
-                if of not in shown:
-                    message = (
-                        f"there is no view or feedback {of!r}; {nearest(of, shown, 'there is')}"
-                    )
-                elif of in views and "patch" not in dict(views[of]):
-                    message = (
-                        f"view {of!r} has no patch for a photodiode; write patch: {{}} under it"
-                    )
-                else:
-                    continue
-                self._source.problem(("streams", label, "sees", channel), message)
+        sensors: list[tuple[Place, str]] = [
+            (("streams", label, "sees", channel), of)
+            for label, need in self._protocol.streams.items()
+            for channel, of in need.sees.items()
+        ]
+        sensors += [
+            (("recordings", name, "sees"), dict(use)["sees"])
+            for name, use in self._protocol.recordings.items()
+            if "sees" in dict(use)
+        ]
+        for place, of in sensors:
+            if of not in shown:
+                message = f"there is no view or feedback {of!r}; {nearest(of, shown, 'there is')}"
+            elif of in views and "patch" not in dict(views[of]):
+                message = f"view {of!r} has no patch for a photodiode; write patch: {{}} under it"
+            else:
+                continue
+            self._source.problem(place, message)
 
     def _check_blocks(self, tasks: Mapping[str, Task]) -> None:
         """Note blocks that name no task, or limit what the task does not vary."""

@@ -1,7 +1,8 @@
 """Postprocessing of a session in its participant file: corrected clocks, and the sync report."""
 
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,7 @@ from labcrane.recording.participant_file.reader import SessionRecord, Stream, se
 from labcrane.recording.participant_file.recorrect import read_channel, read_stream
 from labcrane.recording.participant_file.session_group import write_sync_report
 from labcrane.recording.participant_file.stream_group import write_time, write_uncorrected
-from labcrane.recording.pictures import CAPTURED, LOG, TERMS
+from labcrane.recording.pictures import CAPTURED, LEVEL, LOG, TERMS
 from labcrane.streams.edges import QUIET_S, Change
 from labcrane.streams.recorder.health import counter_label
 from labcrane.streams.sync.correction import Treatment, as_stated, correct
@@ -33,6 +34,7 @@ from labcrane.streams.sync.report.stream_report import (
 )
 from labcrane.streams.sync.report.sync_report import LoopReport, SyncReport, judge_loop, never_came
 from labcrane.streams.sync.resync import columns_of, quality_of, treatment_of
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import h5py
@@ -85,6 +87,8 @@ def conclude(group: "h5py.Group", spaces: Mapping[str, str] = NO_SPACES) -> Sync
             for one, judge in zip(streams, judged, strict=True)
             for channel, of in (one.need.sees if one.need else {}).items()
         ]
+        for one, judge in zip(streams, judged, strict=True):
+            looped += _filmed_back(session, one, judge.quality.error_p95_s, context)
     report = SyncReport(
         tuple(judged), _loop(group, context, limits), never, absent, *shown, tuple(looped)
     )
@@ -138,12 +142,41 @@ def _loop_back(
     session: SessionRecord, one: _Read, stated_s: float, channel: str, of: str
 ) -> LoopBack:
     """Compare a sensor's channel with what the session showed or played."""
-    names = one.recorded.header.name, channel, of
-    try:
+
+    def signal() -> tuple[FloatArray, FloatArray]:
         stream = session.streams[one.group.name.rpartition("/")[2]]
-        signal = stream.time, np.asarray(stream.column(channel), np.float64)
-        changes, light = _changes(session, of)
-        return judge_loop_back(names, changes, signal, stated_s, light=light)
+        return stream.time, np.asarray(stream.column(channel), np.float64)
+
+    return _looped((one.recorded.header.name, channel, of), session, signal, stated_s)
+
+
+def _filmed_back(
+    session: SessionRecord, one: _Read, stated_s: float, context: Mapping[str, Any]
+) -> list[LoopBack]:
+    """Compare the brightness or loudness of a film with the view or sound that it sees."""
+    name = one.recorded.header.name
+    film = name.removeprefix(CAPTURED)
+    settings = context.get("components", {}).get(f"recordings.{film}", {}).get("settings", {})
+    if film == name or not (of := settings.get("sees")):
+        return []
+
+    def signal() -> tuple[FloatArray, FloatArray]:
+        return session.films[film].level(settings["sees_part"])
+
+    found = _looped((name, LEVEL, of), session, signal, stated_s)
+    declared = settings.get("lag_s")
+    return [replace(found, declared_s=math.nan if declared is None else declared)]
+
+
+def _looped(
+    names: tuple[str, str, str],
+    session: SessionRecord,
+    signal: Callable[[], tuple[FloatArray, FloatArray]],
+    stated_s: float,
+) -> LoopBack:
+    try:
+        changes, light = _changes(session, names[2])
+        return judge_loop_back(names, changes, signal(), stated_s, light=light)
     # A sensor must not keep a session from its file, whatever it or its stream is.
     except Exception as error:  # noqa: BLE001
         told = error if isinstance(error, LabcraneError) else f"{error!r}; please report this"

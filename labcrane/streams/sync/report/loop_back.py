@@ -43,6 +43,8 @@ class LoopBack:
     moved_s, noise_s
         By how much the delay of the last third is longer than that of the first, and the
         uncertainty of this difference at 95 % from its scatter.
+    declared_s
+        Lag of a camera or microphone that is declared, and subtracted from the times already.
     """
 
     stream: str
@@ -54,6 +56,7 @@ class LoopBack:
     moved_s: float = float("nan")
     noise_s: float = float("nan")
     findings: tuple[Finding, ...] = ()
+    declared_s: float = float("nan")
 
     def in_words(self) -> str:
         """Return what was measured, in a sentence without its end."""
@@ -68,6 +71,17 @@ class LoopBack:
         return (
             f"{self.channel} shows {late.seen} of {late.asked} changes of {self.of}, "
             f"{1e3 * late.mean_s:.2f} ms later on average (SD {1e3 * late.sd_s:.2f} ms){moved}"
+            f"{self._lag}"
+        )
+
+    @property
+    def _lag(self) -> str:
+        if self.delay is None or not np.isfinite(self.declared_s):
+            return ""
+        measured = self.declared_s + self.delay.mean_s
+        return (
+            f"; a lag of {1e3 * self.declared_s:.2f} ms is declared, and with it "
+            f"{1e3 * measured:.2f} ms are measured"
         )
 
 
