@@ -24,6 +24,7 @@ from .presented import PRESENTED, presentation_failed
 from .questionnaires import answers_of, asked_in, beside_trials, scores_of
 from .tables.annotations import annotations_of
 from .tables.dataset import Dataset, open_dataset
+from .tables.films import films_of
 from .tables.responses import measures_by, responses, responses_of
 
 __all__ = [
@@ -46,6 +47,7 @@ __all__ = [
     "eeg_streams",
     "events_at",
     "faults_of",
+    "films_of",
     "find_cohort",
     "fixations_of",
     "gaze_space",

@@ -27,9 +27,20 @@ rejects duplicates."""
 END = "trial.end"
 FAILED = "presentation_failed"
 
-MARK = "annotation"
+MARK, CODER = "annotation", "coder"
+NOTED = ("time", "until", "text", CODER)
 """An annotation that was added after the recording: a row of that type, and a column with its text
 if there is any."""
+
+FILM = "film"
+FILMED: Mapping[str, dict[str, str]] = {
+    "file": {"Description": "name of the film's file, which is not in this dataset"},
+    "rate_hz": {"Description": "its frames per second", "Units": "Hz"},
+    "frames": {"Description": "its number of frames"},
+    "dropped": {"Description": "frames that were dropped"},
+    "time_error": {"Description": "uncertainty of 95 % of its frames' times", "Units": "s"},
+}
+"""What is known of a film, which is a row of the type ``film``."""
 
 COLUMNS = ("trial", "attempt", "block", "practice", "counted", "outcome", "pair", "direction")
 """Items of an event's data that become columns; an event in a trial also has those of the trial's
@@ -47,7 +58,7 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
     momentary. ``presentation_failed`` is n/a for events outside the trial table, and if nothing was
     to be shown. ``response_time`` is the reaction time: from the trial's start to the first stick
     beyond its dead zone. Annotations that were added after the recording have the type
-    ``annotation`` and their text.
+    ``annotation`` and their text, and films the type ``film``.
     """
     import pandas as pd
 
@@ -79,8 +90,15 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
     marks = session.annotations
     rows += [
         {"onset": time - zero, "duration": until - time, "trial_type": MARK, "label": MARK,
-         MARK: " ".join(text.split())}
-        for time, until, text in zip(marks["time"], marks["until"], marks["text"], strict=True)
+         MARK: " ".join(text.split()), CODER: coder or None}
+        for time, until, text, coder in zip(*(marks[name] for name in NOTED), strict=True)
+    ]  # fmt: skip
+    rows += [
+        {"onset": row["time"] - zero, "duration": row["until"] - row["time"], "trial_type": FILM,
+         "label": f"film {row['recording']}",
+         **{f"{FILM}_{fact}": row[fact] for fact in FILMED}}
+        for film in session.films.values()
+        for row in film.listed()
     ]  # fmt: skip
     table = pd.DataFrame(rows).sort_values("onset", kind="stable", ignore_index=True)
     again = table.groupby(["onset", "trial_type"]).cumcount() + 1
@@ -119,9 +137,13 @@ def event_description(
     """
     types = hed_sidecar(table["trial_type"])
     hed = {name: f"{tags.removesuffix(')')}, {{{REPEAT}}})" for name, tags in types["HED"].items()}
-    marked = {MARK: {"Description": "text of an annotation that was added after the recording"}}
+    marked = {
+        MARK: {"Description": "text of an annotation that was added after the recording"},
+        CODER: {"Description": "who added it"},
+    }
     return {
         **(marked if MARK in table else {}),
+        **{name: said for fact, said in FILMED.items() if (name := f"{FILM}_{fact}") in table},
         "onset": {"Description": "from the first sample of motion", "Units": "s"},
         "duration": {
             "Description": "of a trial; n/a if its end is unknown; 0 for a momentary event",

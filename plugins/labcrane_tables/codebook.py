@@ -33,6 +33,19 @@ OTHERS = {
         "until": ("s", "end of what was marked, on the session's clock"),
         "text": ("", "what was written"),
         "written": ("", "when it was written"),
+        "coder": ("", "who wrote it, by the coder's abbreviation"),
+    },
+    "films": {
+        "participant": ("", "pseudonym, with PILOT or SIMULATED if it applies"),
+        "session": ("1", "number of the session, from 1"),
+        "recording": ("", "camera, microphone or screen, as the protocol calls it"),
+        "file": ("", "name of the file next to the participant file; empty if it is missing"),
+        "time": ("s", "time of its first frame on the session's clock"),
+        "until": ("s", "time of its last frame on the session's clock"),
+        "rate_hz": ("Hz", "frames per second"),
+        "frames": ("1", "frames in the file"),
+        "dropped": ("1", "frames that the device or the computer dropped"),
+        "time_error": ("s", "uncertainty of the times, which 95 % of the frames do not exceed"),
     },
 }
 """Unit and meaning of the columns of tables that only this export has."""

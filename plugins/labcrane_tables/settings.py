@@ -12,6 +12,10 @@ class TableSettings(Settings):
     """How streams, one row per tick, are written. Parquet is small and fast; R reads it with the
     package arrow or nanoparquet. Gzipped CSV needs no package, but takes ten times as long."""
 
+    films: bool = False
+    """Whether the films of cameras, microphones and screens are copied, too. Faces and voices are
+    personal data."""
+
 
 class ArchiveSettings(Settings):
     """Settings of :class:`~labcrane_tables.archive.Archive`."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
-from shutil import copyfile
+from shutil import copy, copyfile
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis import (
@@ -16,6 +16,7 @@ from labcrane.analysis import (
     annotations_of,
     answers_of,
     beside_trials,
+    films_of,
     fixations_of,
     measures_of,
     presentation_failed,
@@ -45,6 +46,7 @@ class Tables(Exporter):
     ``trials``           one row per movement: condition, results, measures
     ``events``           one row per event
     ``annotations``      one row per mark that people made afterwards, where there is one
+    ``films``            one row per file of a camera, microphone or screen, where there is one
     ``questionnaires``   one row per answer
     ``scores``           one row per score of a questionnaire
     ``fixations``        one row per point at which the eye tracker was checked, where it was
@@ -64,7 +66,7 @@ class Tables(Exporter):
 
         (folder / "streams").mkdir()
         people, trials, answers, scores, marks, looked_at = [], [], [], [], [], []
-        responded = []
+        responded, films = [], []
         names = Names()
         book = Codebook(names)
         events = _Growing(folder / "events")
@@ -77,6 +79,9 @@ class Tables(Exporter):
             marks.append(annotations_of(participant))
             looked_at.append(fixations_of(participant))
             responded.append(responses_of(participant))
+            films.append(films_of(participant))
+            if self._settings.films:
+                _copy_films(participant, films[-1], folder / "films")
             scores.append(scores_of(participant))
             for number, session in participant.sessions():
                 events.add(_events(participant, number, session))
@@ -86,6 +91,7 @@ class Tables(Exporter):
             ("annotations", marks),
             ("fixations", looked_at),
             ("responses", responded),
+            ("films", films),
         ):
             if any(map(len, tables)):
                 book.has(name, write_csv(joined(tables), folder / f"{name}.csv"))
@@ -119,6 +125,13 @@ class Tables(Exporter):
                 book.has(table.name, write_parquet(table, folder / f"{stem}.parquet"))
             if forms in {"both", "csv"}:
                 book.has(table.name, _write_packed_csv(table, folder / f"{stem}.csv.gz"))
+
+
+def _copy_films(participant: Participant, films: "pd.DataFrame", folder: Path) -> None:
+    folder.mkdir(mode=0o700, exist_ok=True)
+    for name in films["file"] if len(films) else ():
+        if name:
+            copy(participant.path.with_name(name), folder / f"{participant.name}_{name}")
 
 
 def write_parquet(table: StreamTable, path: Path) -> "pa.Schema":

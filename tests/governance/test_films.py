@@ -1,7 +1,12 @@
 """Films of people: consent that names them, and no byte left of who is erased."""
 
+import stat
+import zipfile
 from pathlib import Path
 
+import h5py
+import numpy as np
+import pandas as pd
 import pytest
 from faults.sessions import labcrane
 from governance.kept_people import REASON, check_erased, copied, files, store_of
@@ -12,6 +17,13 @@ from labcrane.cli.commands.check import examined
 from labcrane.participants import recovery as unfinished
 from labcrane.participants.copies import inventory
 from labcrane.protocol.questions import questions
+from labcrane.recording import Channel, StreamHeader
+from labcrane.recording.participant_file.columns import (
+    write_attributes,
+    write_numbers,
+    write_text,
+)
+from labcrane.recording.pictures import CHANNELS, TERMS
 
 FILMED = GOVERNED + (
     "recordings:\n  face: {use: camera, device: /dev/video9, consent: we film your face}\n"
@@ -88,6 +100,81 @@ def test_no_export_contains_a_film(lab: Lab, tmp_path: Path, exporter: str) -> N
     made = [path for path in out.rglob("*") if path.is_file()]
     assert made
     assert not [path for path in made if b"face of " in path.read_bytes()]
+
+
+def listed(lab: Lab, name: str) -> None:
+    """List a participant's films in the participant file, as a session does."""
+    path = lab.places.raw(name) / f"{name}.h5"
+    channels = tuple(Channel(label, unit) for label, unit in CHANNELS.items())
+    with h5py.File(path, "r+") as file:
+        start = file["ses-01/time"][0]
+        stream = file.create_group("ses-01/streams/labcrane.capture.face")
+        about = {"name": "labcrane.capture.face", "type": "Capture", "rate_hz": 0.0}
+        write_attributes(stream, about)
+        write_text(stream, "header", StreamHeader(about["name"], "Capture", channels).xml)
+        for column in ("time_raw", "time", "time_error"):
+            times = start + np.r_[0:10, 20:30] / 10
+            write_numbers(stream, column, times if "error" not in column else 0 * times + 0.01, "s")
+        data = stream.create_group("data")
+        for at, (label, values) in enumerate(
+            {"frame.number": np.r_[0:9, 10, 0:10], "file": np.repeat([1, 2], 10),
+             "pts": np.r_[0:10, 0:10] / 10, **dict.fromkeys(TERMS, np.zeros(20))}.items()
+        ):  # fmt: skip
+            write_numbers(data, f"c{at}", values.astype(float), CHANNELS[label])
+            write_attributes(data[f"c{at}"], {"position": at, "name": label})
+
+
+@pytest.mark.slow
+def test_tables_and_bids_list_the_films_and_copy_them_only_when_asked(
+    lab: Lab, tmp_path: Path
+) -> None:
+    made = filmed(lab)
+    for name in ("P001", "P002"):
+        listed(lab, name)
+
+    def export(to: str, *words: object) -> Path:
+        out = tmp_path / f"{to}{len(words)}"
+        done = labcrane("export", lab.places.root, "--to", to, "--out", out, *words)
+        said = done.communicate()[0]
+        assert done.returncode == 0, said
+        return out
+
+    films = pd.read_csv(export("tables") / "films.csv")
+    assert films["file"].tolist() == ["ses-01_face.mkv", "ses-01_face.2.mkv"] * 2
+    assert films["dropped"].tolist() == [1, 0] * 2
+    assert films["frames"].tolist() == [10] * 4
+    assert films["time_error"].tolist() == pytest.approx([0.01] * 4)
+    copies = export("tables", "--set", "films=true") / "films"
+    for path in copies.iterdir():
+        name, _, file = path.name.partition("_")
+        assert path.read_bytes() == made[f"{name}/{file}"]
+        assert stat.S_IMODE(path.stat().st_mode) == stat.S_IMODE(
+            (lab.places.raw(name) / file).stat().st_mode
+        )
+    assert len([*copies.iterdir()]) == 4
+    for path in export("bids").glob("sub-*/ses-01/motion/*_events.tsv"):
+        events = pd.read_csv(path, sep="\t", na_values="n/a")
+        rows = events[events["trial_type"] == "film"]
+        if len(rows):
+            assert rows["film_file"].tolist() == ["ses-01_face.mkv", "ses-01_face.2.mkv"]
+            assert rows["onset"].tolist() == pytest.approx([0.0, 2.0], abs=1e-3)
+            assert "film_dropped" in path.with_suffix(".json").read_text()
+    unfinished.erase(lab.places, "P001", REASON, TODAY)
+    assert not [path for path in copies.rglob("*") if b"face of 001" in path.read_bytes()]
+
+
+@pytest.mark.slow
+def test_an_archive_and_a_bundle_have_no_byte_of_a_film(lab: Lab, tmp_path: Path) -> None:
+    filmed(lab)
+    out = tmp_path / "out"
+    words = ("--set", "license=CC0-1.0", "--set", "authors=[A. B.]")
+    done = labcrane("export", lab.places.root, "--to", "zip", "--out", out, *words)
+    said = done.communicate()[0]
+    assert done.returncode == 0, said
+    (packed,) = out.glob("*.zip")
+    with zipfile.ZipFile(packed) as archive:
+        assert archive.namelist()
+        assert not [name for name in archive.namelist() if b"face of " in archive.read(name)]
 
 
 def test_where_lists_the_folder_with_the_films(lab: Lab) -> None:

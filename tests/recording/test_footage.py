@@ -53,7 +53,10 @@ def listed(folder: Path, rows: list[tuple[float, int, int, float]], name: str = 
     time, number, file, pts = np.array(rows, float).T
     columns = {"frame.number": number, "file": file, "pts": pts}
     stream = SimpleNamespace(
-        name=f"labcrane.capture.{name}", time=time, columns=lambda names: columns
+        name=f"labcrane.capture.{name}",
+        time=time,
+        time_error=0.001 * time,
+        columns=lambda _: columns,
     )
     return Footage(stream, folder, 1)
 
@@ -104,7 +107,13 @@ def test_a_gap_has_its_words_and_no_old_picture(tmp_path: Path) -> None:
         8,
         17,
     ]
-    assert found.dropped == 2
+    (folder := tmp_path / "ses-01_face.2.mkv").touch()
+    one, two = found.listed()
+    assert (one["file"], one["frames"], one["dropped"], one["until"]) == ("", 8, 2, 0.9)
+    assert (two["file"], two["frames"], two["dropped"], two["time"]) == (folder.name, 10, 0, 3.0)
+    assert two["rate_hz"] == pytest.approx(10.0)
+    assert two["time_error"] == pytest.approx(np.quantile(0.003 + 1e-4 * np.arange(10), 0.95))
+    folder.unlink()
     with pytest.raises(RecordingError, match=r"face: file 2 is missing in .*; put it back"):
         found.picture(8)
 

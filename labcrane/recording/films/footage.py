@@ -2,16 +2,15 @@
 
 import io
 import wave
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from threading import Lock
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from labcrane.errors import RecordingError
 from labcrane.recording.films.film_file import FilmFile
-from labcrane.recording.participant_file.reader import Stream
 from labcrane.recording.pictures import CAPTURED
 from labcrane.types import FloatArray
 
@@ -22,6 +21,23 @@ LASTS = 1.5
 """Before a gap, a frame is shown for so many usual durations."""
 
 FULL_SCALE = 32_768.0
+
+
+class FrameList(Protocol):
+    """The list of frames, as :class:`labcrane.recording.participant_file.reader.Stream` has it."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def time(self) -> FloatArray: ...
+
+    @property
+    def time_error(self) -> FloatArray: ...
+
+    def columns(self, names: Sequence[str], /) -> Mapping[str, Any]: ...
+
+    def __len__(self) -> int: ...
 
 
 class Footage:
@@ -35,13 +51,14 @@ class Footage:
         Where its files are, and whose they are.
     """
 
-    def __init__(self, stream: Stream, folder: Path, session: int) -> None:
+    def __init__(self, stream: FrameList, folder: Path, session: int) -> None:
         self.name = stream.name.removeprefix(CAPTURED)
         rows = stream.columns(("frame.number", "file", "pts"))
         order = np.argsort(stream.time, kind="stable")
         self.time: FloatArray = stream.time[order]
         self._number, self._file = (rows[name][order] for name in ("frame.number", "file"))
         self._pts = rows["pts"][order]
+        self.time_error: FloatArray = stream.time_error[order]
         self._folder, self._session = folder, session
         self._follows = (np.diff(self._file) == 0) & (np.diff(self._number) == 1)
         steps = np.diff(self.time)[self._follows]
@@ -49,11 +66,22 @@ class Footage:
         self._reading = Lock()  # each question of a page has a thread of its own
         self._reader: FilmFile | None = None
 
-    @property
-    def dropped(self) -> int:
-        """How many frames were dropped inside the files."""
-        within = np.diff(self._file) == 0
-        return int((np.diff(self._number)[within] - 1).sum())
+    def listed(self) -> Iterator[dict[str, Any]]:
+        """Yield what is known of each file: name, first and last time, frames, rate, and so on."""
+        for number, path in self.files.items():
+            rows = np.flatnonzero(self._file == number)
+            first, last = self.time[rows[[0, -1]]].tolist()
+            numbers = self._number[rows[[0, -1]]]
+            yield {
+                "recording": self.name,
+                "file": "" if path is None else path.name,
+                "time": first,
+                "until": last,
+                "rate_hz": 1.0 / self.period_s if self.period_s else np.nan,
+                "frames": len(rows),
+                "dropped": int(numbers[1] - numbers[0]) + 1 - len(rows),
+                "time_error": float(np.quantile(self.time_error[rows], 0.95)),
+            }
 
     @property
     def files(self) -> dict[int, Path | None]:
@@ -184,7 +212,7 @@ class Footage:
         return self._reader
 
 
-def footage(streams: Mapping[str, Stream], folder: Path, session: int) -> dict[str, Footage]:
+def footage(streams: Mapping[str, FrameList], folder: Path, session: int) -> dict[str, Footage]:
     """Return the footage of a session by the names of its recordings."""
     found = (
         Footage(stream, folder, session)

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
+    from labcrane.recording.films.footage import Footage
+
 _SESSION = re.compile(r"ses-([0-9]+)")
 
 
@@ -336,7 +338,7 @@ class SessionRecord:
 
     @property
     def annotations(self) -> "pd.DataFrame":
-        """One row per annotation that people added afterwards: time, until, text and written.
+        """One row per annotation that people added afterwards: time, until, text, written, coder.
 
         Times are in seconds on the session's clock. Each access reads them again, from the file
         next to the participant file (:mod:`labcrane.recording.annotations`): a participant file
@@ -355,6 +357,13 @@ class SessionRecord:
                 for name in COLUMNS
             }
         )
+
+    @cached_property
+    def films(self) -> "dict[str, Footage]":
+        """Cameras, microphones and screens by name, with files next to the participant file."""
+        from labcrane.recording.films.footage import footage  # noqa: PLC0415 - it imports this
+
+        return footage(self.streams, self._path.parent, int(self._group.removeprefix("ses-")))
 
     @cached_property
     def trials(self) -> "pd.DataFrame":
