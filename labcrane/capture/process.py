@@ -46,6 +46,7 @@ def run(config: CaptureConfig, parent: Parent) -> None:
     study = load(config.study, discover(study=config.study), recorded=config.recorded)
     recording = study.recordings[config.name].build(study.machine)
     assert isinstance(recording, Capture)  # noqa: S101 - an offer of this role
+    recording.windows = {name: study.window_title(name) for name in study.protocol.views}
     check_clock()
     try:
         recording.begin()

@@ -19,6 +19,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from pydantic import BaseModel
@@ -312,6 +313,9 @@ class Capture(Component):
 
     suffix: str = ".mkv"
     """How the names of its files end."""
+
+    windows: Mapping[str, str] = MappingProxyType({})
+    """Titles of the windows of the study's views, by view; set before ``begin``."""
 
     @abstractmethod
     def begin(self) -> None:

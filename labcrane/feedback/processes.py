@@ -100,7 +100,7 @@ def host_orders(study: Study, run: Run, source: str) -> list[FeedbackConfig]:
                 study.path,
                 always=True,
                 cues=cues,
-                title=f"labcrane: {name} - {study.protocol.study}",
+                title=study.window_title(name),
                 before=tuple(parts[:number]),
             )
             for number, (name, part) in enumerate(views.items())

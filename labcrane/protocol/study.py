@@ -115,6 +115,10 @@ class Study:
         """Top level of the protocol's file, as it is written; empty for a record."""
         return self.source.data if self.source else {}
 
+    def window_title(self, view: str) -> str:
+        """Return the title of a view's window."""
+        return f"labcrane: {view} - {self.protocol.study}"
+
     def where(self, place: Place) -> str:
         """Return file, line and column of what the protocol has at ``place``."""
         return self.source.where(place) if self.source else str(self.path)
@@ -220,6 +224,7 @@ class Checker:
         self._check_names()
         self._check_own_streams()
         self._check_sensors()
+        self._check_windows()
         if self._protocol.participants.ends_early:
             self._source.problem(
                 ("participants", "pattern"),
@@ -249,6 +254,15 @@ class Checker:
             )
             message = f"labcrane sends no stream {name!r}; {there}"
             self._source.problem(("streams", label, "name"), message)
+
+    def _check_windows(self) -> None:
+        """Note recordings of a view that there is not."""
+        views = self._protocol.views
+        for name, use in self._protocol.recordings.items():
+            of = dict(use).get("of")
+            if of is not None and of not in views:
+                message = f"there is no view {of!r}; {nearest(of, views, 'there is')}"
+                self._source.problem(("recordings", name, "of"), message)
 
     def _check_sensors(self) -> None:
         """Note sensors at a view or sound that there is not, or at a view without a patch."""

@@ -15,7 +15,7 @@ import av
 
 from labcrane import Capture, DeviceError
 from labcrane.core import Captured, Finding, Verdict
-from labcrane_film.settings import SourceSettings
+from labcrane_film.settings import ScreenSettings, SourceSettings
 from labcrane_film.stamps import ArrivalSpread, StampClock
 
 MS = Fraction(1, 1000)
@@ -55,6 +55,8 @@ class FilmedSource(Capture):
 
     def begin(self) -> None:
         settings = self._settings
+        if isinstance(settings, ScreenSettings) and settings.of is not None:
+            self._device, self._options = settings.window(self.windows[settings.of])
         try:
             self._input = av.open(
                 self._device,
@@ -175,7 +177,9 @@ class FilmedSource(Capture):
 
 def examine(settings: SourceSettings) -> list[Finding]:
     """Open a device as a session would, and read some of its frames."""
-    source = FilmedSource(settings)
+    # A view's window is not open now: its screen is tried.
+    shown = isinstance(settings, ScreenSettings)
+    source = FilmedSource(settings.model_copy(update={"of": None}) if shown else settings)
     try:
         source.begin()
         return [source.look()]

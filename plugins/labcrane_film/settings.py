@@ -6,7 +6,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
+from labcrane import DeviceError
 from labcrane.core import CaptureSettings, Usual
+from labcrane_film.windows import window_of
 
 SYSTEM = sys.platform if sys.platform in {"win32", "darwin"} else "linux"
 CAMERAS = {"linux": "v4l2", "win32": "dshow", "darwin": "avfoundation"}
@@ -99,11 +101,26 @@ class ScreenSettings(SourceSettings):
     part: tuple[int, int, PositiveInt, PositiveInt] | None = None
     """Left, top, width and height in pixels; the whole screen by default."""
 
+    of: str | None = None
+    """The view whose window is recorded, instead of a part of the screen. On Linux and Windows; of
+    a view that fills a monitor as of one in a window."""
+
     rate_hz: Annotated[PositiveFloat, Usual(1.0, 1000.0)] = 30.0
     """Pictures per second."""
 
     lag_s: Annotated[float | None, Usual(1e-5, 2.0)] = 0.0
     """As of a camera. What is recorded is the picture in the computer; a display shows it later."""
+
+    def window(self, title: str) -> tuple[str, dict[str, str]]:
+        """Return FFmpeg's name of the screen that has a window of a title, and its options."""
+        display, form, options = self.source()
+        if form == "gdigrab":
+            return f"title={title}", options
+        if form != "x11grab":
+            raise DeviceError(
+                f"a view's window cannot be recorded by {form}; record the screen: remove of"
+            )
+        return display, options | {"window_id": hex(window_of(display, title))}
 
     def source(self) -> tuple[str, str | None, dict[str, str]]:
         form = self.format or SCREENS[SYSTEM]

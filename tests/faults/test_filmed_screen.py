@@ -18,6 +18,7 @@ from faults.sessions import labcrane, wait_for
 from faults.test_filmed_session import STUDY, WHO, check_files, size
 from needs import needs
 
+from labcrane import DeviceError
 from labcrane.core import Captured
 from labcrane_film.film import FilmedSource
 from labcrane_film.settings import ScreenSettings
@@ -114,6 +115,38 @@ def test_the_frame_in_which_a_flash_is_seen_is_stamped_within_its_uncertainty(
         first, last = frame.time - frame.clock, frame.time + frame.clock + frame.arrival
         assert grey > 128 or not ((after <= first) & (last <= ends)).any()
     assert np.median([each.clock + each.arrival for each in told]) < 0.02
+
+
+def test_the_window_of_a_view_is_recorded_wherever_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "screen.mkv"
+    with x_server() as (display, _):
+        flasher = Flasher(display)
+        flasher.turn(0)
+        x, root = flasher._x, flasher._root
+        x.XCreateSimpleWindow.restype = ctypes.c_ulong
+        for left, colour, title in ((10, 0xFFFFFF, b"another"), (120, 0x808080, b"labcrane: main")):
+            window = ctypes.c_ulong(
+                x.XCreateSimpleWindow(flasher._display, root, left, 30, 96, 64, 0, 0, colour)
+            )
+            x.XStoreName(flasher._display, window, title)
+            x.XMapWindow(flasher._display, window)
+        x.XSync(flasher._display, 0)
+        film = FilmedSource(ScreenSettings(display=display, of="main", consent="we film"))
+        film.windows = {"main": "labcrane: nowhere"}
+        with pytest.raises(DeviceError, match="has no window 'labcrane: nowhere'; open the view"):
+            film.begin()
+        film.windows = {"main": "labcrane: main"}
+        film.begin()
+        film.write_to(path)
+        told = [frame for _ in range(8) for frame in film.read()]
+        told += film.end()
+        film.close()
+        flasher.close()
+    with av.open(str(path)) as file:
+        frames = [frame.to_ndarray(format="gray") for frame in file.decode(0)]
+    assert len(frames) == len(told) == 8
+    assert frames[-1].shape == (64, 96)
+    np.testing.assert_allclose(frames[-1], 128, atol=4)
 
 
 def test_a_screen_that_goes_and_comes_back_is_recorded_again(tmp_path: Path) -> None:
