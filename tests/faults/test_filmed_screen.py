@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 from faults.sessions import labcrane, wait_for
 from faults.test_filmed_session import STUDY, WHO, check_files, size
-from needs import needs
+from needs import GRAPHICS, needs
 
-from labcrane import DeviceError
+from labcrane import DeviceError, open_recording
 from labcrane.core import Captured
 from labcrane_film.film import FilmedSource
 from labcrane_film.settings import ScreenSettings
@@ -147,6 +147,40 @@ def test_the_window_of_a_view_is_recorded_wherever_it_is(tmp_path: Path) -> None
     assert len(frames) == len(told) == 8
     assert frames[-1].shape == (64, 96)
     np.testing.assert_allclose(frames[-1], 128, atol=4)
+
+
+FLASHED = """\
+views:
+  main:
+    {use: view, renderer: software, size: [120, 120],
+     patch: {on: [trial.start], corner: top_left}}
+recordings:
+  screen:
+    {use: screen, of: main, consent: the screen, sees: main, sees_part: [4, 4, 40, 40]}
+"""
+
+
+@needs(*GRAPHICS)
+def test_a_session_measures_how_late_its_own_view_is_in_the_film(tmp_path: Path) -> None:
+    protocol, data = tmp_path / "study.yaml", tmp_path / "data"
+    plain = STUDY[: STUDY.index("recordings:")].replace("study: filmed", "study: filmed_view")
+    protocol.write_text(plain + FLASHED)
+    with x_server() as (display, _):
+        env = {**os.environ, "DISPLAY": display}
+        launcher = labcrane("run", protocol, *WHO, data, "--feedback", env=env)
+        said = launcher.communicate(timeout=240)[0]
+    assert launcher.returncode == 0, said
+    folder = data / "P001-SIMULATED"
+    session = open_recording(folder / f"{folder.name}.h5").session(1)
+    (found,) = session.sync_report["loop_back"]
+    assert (found["channel"], found["of"], found["verdict"]) == ("level", "main", "PASS"), dict(
+        found
+    )["findings"]
+    assert found["delay"]["seen"] == found["delay"]["asked"] > 3
+    assert -0.15 < found["delay"]["mean_s"] < 0.2  # a picture in the computer, and a busy one
+    assert "a lag of 0.00 ms is declared, and with it" in said
+    with av.open(str(folder / "ses-01_screen.mkv")) as file:
+        assert (file.streams[0].width, file.streams[0].height) == (120, 120)
 
 
 def test_a_screen_that_goes_and_comes_back_is_recorded_again(tmp_path: Path) -> None:

@@ -164,7 +164,7 @@ def test_tables_and_bids_list_the_films_and_copy_them_only_when_asked(
 
 
 @pytest.mark.slow
-def test_an_archive_and_a_bundle_have_no_byte_of_a_film(lab: Lab, tmp_path: Path) -> None:
+def test_an_archive_has_no_byte_of_a_film(lab: Lab, tmp_path: Path) -> None:
     filmed(lab)
     out = tmp_path / "out"
     words = ("--set", "license=CC0-1.0", "--set", "authors=[A. B.]")

@@ -120,10 +120,12 @@ def judge_loop_back(
             "let it change on events of the session, and start the device before it",
         )
         return LoopBack(*names, stated_s, Verdict.WARN, findings=(finding,))
-    late = np.array(
-        [_late(one, after, times, values, light=light) for one, after in _spans(changes)]
-    )
     sensor_hz = (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else float("nan")
+    # An edge may be as early as times may be off, and by a sample.
+    early_s = EARLY_S + float(np.nan_to_num(stated_s)) + float(np.nan_to_num(1.0 / sensor_hz))
+    late = np.array(
+        [_late(one, after, times, values, early_s, light=light) for one, after in _spans(changes)]
+    )
     try:
         found = in_short(late, sensor_hz)
     except DeviceError as error:
@@ -166,7 +168,13 @@ def _spans(changes: Sequence[Change]) -> list[tuple[Change, float]]:
 
 
 def _late(
-    change: Change, after: float, times: FloatArray, values: FloatArray, *, light: bool
+    change: Change,
+    after: float,
+    times: FloatArray,
+    values: FloatArray,
+    early_s: float,
+    *,
+    light: bool,
 ) -> float:
     """Return how long after a change the first edge is near it; NaN without one.
 
@@ -182,5 +190,5 @@ def _late(
         edges = steps(near, level) if light else onsets(near, level)
     except DeviceError:
         return float("nan")
-    late = (edge.time - change.time for edge in edges if edge.time >= change.time - EARLY_S)
+    late = (edge.time - change.time for edge in edges if edge.time >= change.time - early_s)
     return next(late, float("nan"))
