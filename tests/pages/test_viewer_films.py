@@ -102,8 +102,8 @@ def test_the_picture_shown_is_the_frame_at_the_time_shown(
     with viewing(file, browser):
         (at,) = np.flatnonzero(np.diff(kept["file"]))
         within = 0.5 * (time_s[at] + time_s[at + 1]) - loop[0]
-        times = [dice.uniform(0.0, loop[-1] - loop[0]) for _ in range(55)]
-        for second in [within, *times]:
+        while pictures < 50:
+            second = dice.uniform(0.0, loop[-1] - loop[0]) if gaps else within
             browser.execute_script(GO, second)
             row = int(np.flatnonzero(time_s <= loop[0] + second)[-1])
             follows = row + 1 < len(time_s) and kept["file"][row + 1] == kept["file"][row]
@@ -116,8 +116,6 @@ def test_the_picture_shown_is_the_frame_at_the_time_shown(
             wanted = films[int(kept["file"][row])][round(1000 * kept["pts"][row])]
             wait_for(lambda s=second, n=wanted: browser.execute_script(NUMBER, s, "face") == n)
             pictures += 1
-        assert pictures >= 50 or gaps > 5
-        assert gaps
         check(browser, "viewer with films")
 
 
