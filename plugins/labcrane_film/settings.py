@@ -4,7 +4,7 @@ import os
 import sys
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, field_validator
 
 from labcrane import DeviceError
 from labcrane.core import CaptureSettings, Usual
@@ -15,6 +15,9 @@ CAMERAS = {"linux": "v4l2", "win32": "dshow", "darwin": "avfoundation"}
 MICROPHONES = {"linux": "alsa", "win32": "dshow", "darwin": "avfoundation"}
 SCREENS = {"linux": "x11grab", "win32": "gdigrab", "darwin": "avfoundation"}
 """What FFmpeg calls the devices of each system."""
+
+LOGIN = "LABCRANE_CAMERA_LOGIN"
+"""Environment variable with the login of cameras of the network: a protocol is public."""
 
 
 class SourceSettings(CaptureSettings):
@@ -51,7 +54,8 @@ class FilmCameraSettings(SourceSettings):
 
     device: str
     """``/dev/video0`` on Linux, the camera's name on Windows, its number or name on a Mac; or an
-    address: ``rtsp://10.0.0.5/stream``."""
+    address: ``rtsp://10.0.0.5/stream``. Its login, ``name:password``, is in the environment
+    variable ``LABCRANE_CAMERA_LOGIN``."""
 
     size: Annotated[tuple[PositiveInt, PositiveInt] | None, Usual(16, 16_384)] = None
     """Width and height in pixels; the camera's own by default."""
@@ -62,9 +66,22 @@ class FilmCameraSettings(SourceSettings):
     compression: str | None = None
     """What the camera is to send: ``mjpeg`` or ``h264``, which is copied into the file."""
 
+    @field_validator("device")
+    @classmethod
+    def _without_login(cls, device: str) -> str:
+        if "@" in device.partition("://")[2].partition("/")[0]:
+            raise ValueError(
+                "the address has a login, and every participant file keeps the protocol; set the "
+                f"environment variable {LOGIN} to name:password, and take it out of the address"
+            )
+        return device
+
     def source(self) -> tuple[str, str | None, dict[str, str]]:
-        if "://" in self.device:
-            return self.device, self.format, dict(self.options)
+        kind, network, place = self.device.partition("://")
+        if network:
+            login = os.environ.get(LOGIN, "")
+            address = f"{kind}://{login}@{place}" if login else self.device
+            return address, self.format, dict(self.options)
         form = self.format or CAMERAS[SYSTEM]
         device = f"video={self.device}" if form == "dshow" else self.device
         asked = {

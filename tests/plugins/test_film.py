@@ -18,7 +18,7 @@ from labcrane.streams.sync.correction import as_stated
 from labcrane.testing import CaptureContract, ExaminationContract
 from labcrane_film import labcrane_captures, stamps
 from labcrane_film.film import FilmedSource, examine
-from labcrane_film.settings import FilmCameraSettings, MicrophoneSettings, SourceSettings
+from labcrane_film.settings import LOGIN, FilmCameraSettings, MicrophoneSettings, SourceSettings
 
 CLOCKED = "settb=1/1000000,realtime,setpts=RTCTIME"
 """A source in real time, stamped with the computer's date as drivers do."""
@@ -275,15 +275,24 @@ def test_b_frames_are_refused_by_name_before_a_file_begins(tmp_path: Path) -> No
     assert "source.mkv' (matroska) go back: it sends B-frames" in found.text
 
 
-@pytest.mark.parametrize("login", ["", "admin:s3cr@t@"])
-def test_a_message_about_a_network_camera_has_its_address_without_the_password(login: str) -> None:
-    address = f"rtsp://{login}127.0.0.1:9/stream"
-    film = FilmedSource(FilmCameraSettings(device=address, consent="we film"))
+@pytest.mark.parametrize("login", ["", "admin:s3cr@t"])
+def test_a_message_about_a_network_camera_has_its_address_without_the_password(
+    login: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(LOGIN, login)
+    settings = FilmCameraSettings(device="rtsp://127.0.0.1:9/stream", consent="we film")
+    assert settings.source()[0] == f"rtsp://{login}@127.0.0.1:9/stream".replace("//@", "//")
+    film = FilmedSource(settings)
     with pytest.raises(DeviceError, match=r"'rtsp://127.0.0.1:9/stream' cannot be") as raised:
         film.begin()
     film.close()
     assert "s3cr" not in f"{raised.value}{raised.value.__cause__}"
     assert "admin" not in str(raised.value)
+
+
+def test_a_login_in_the_address_is_refused_since_every_recording_would_keep_it() -> None:
+    with pytest.raises(ValueError, match="environment variable LABCRANE_CAMERA_LOGIN to name:pass"):
+        FilmCameraSettings(device="rtsp://admin:s3cr@t@127.0.0.1/stream", consent="we film")
 
 
 def test_a_device_that_is_not_there_is_named_with_what_to_do() -> None:
