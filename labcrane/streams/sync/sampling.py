@@ -26,7 +26,7 @@ EXACT = 0.1
 """Stamps that scatter by less than this part of a period leave no doubt which are missing."""
 
 FEW_LOST = 0.1
-STRAY_S = 3e-4
+STRAY_S, SHARP = 3e-4, 8.0
 WHOLE = 0.25
 """A step this close to whole periods has lost whole samples."""
 
@@ -255,10 +255,8 @@ def examine(
                 shift_s=receipt.open_shift(flowed, index),
                 breaks=found.breaks[: 0 if counter is None else None],
                 chunk_s=found.chunk_s,
-                wander_s=wander.find(
-                    found.unpaused,
-                    index if lost is None else index - lost.open,
-                    waited.period,
+                wander_s=found.moves(
+                    stamps, waited.period, index if lost is None else index - lost.open
                 ).open_s,
             )
     noise, late, by_grid, uneven = _noise(time, arrival, found, grid)
@@ -266,7 +264,7 @@ def examine(
     steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
     moves = None
     if probed and not disordered:
-        moves = wander.find(found.unpaused, found.told, found.period)
+        moves = found.moves(stamps, found.period, found.told)
     unplaced = late and counter is None and (found.clumped or found.missing > 0)
     return Sampling(
         found.period,
@@ -365,9 +363,16 @@ class _Steps:
     slips: bool
     chunk_s: float
 
+    def moves(self, stamps: FloatArray, period: float, index: FloatArray) -> wander.Wander:
+        """Return how the level of stamps changes on both clocks: one of them may be slewed."""
+        unmoved = self.unpaused - self.time
+        ours, theirs = (wander.find(each + unmoved, index, period) for each in (self.time, stamps))
+        return wander.Wander(np.minimum(ours.open_s, theirs.open_s), ours.passing_s)
+
     def strayed(self, passing_s: FloatArray) -> int:
         """Return how many samples stray by more than steps scatter, and come back."""
-        return int(np.count_nonzero(passing_s > self.stray_s))
+        usual = SHARP * float(np.quantile(passing_s, 0.75))  # a rate that waves strays all along
+        return int(np.count_nonzero(passing_s > max(self.stray_s, usual)))
 
 
 def _steps(

@@ -61,9 +61,10 @@ def find(time: FloatArray, index: FloatArray, period: float) -> Wander:
     count = len(time) // size
     if count < 2:  # noqa: PLR2004
         return Wander(*np.zeros((2, len(time))))
-    late = (time - time[0] - period * (index - index[0]))[: count * size].reshape(count, size)
+    due = period * (index - index[0])
+    late = (time - time[0] - due)[: count * size].reshape(count, size)
     level = np.sort(late, axis=1)[:, size // 4 : size - size // 4].mean(axis=1)
-    at = time[size // 2 :: size][:count]
+    at = due[size // 2 :: size][:count]
     far = min(STRETCH, count - 1)
     level = level - at * _usual((level[far:] - level[:-far]) / (at[far:] - at[:-far]))
     lasting = _lasting(level)
