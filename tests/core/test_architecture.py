@@ -244,7 +244,7 @@ def test_only_the_search_asks_liblsl_who_is_there() -> None:
 
 
 ASKED_FOR_BY_OTHERS = {
-    "get_code", "format_commands", "_fields_", "asset", "action_space", "observation_space",
+    "get_code", "format_commands", "_fields_", "asset",
 }  # fmt: skip
 """By Python's import, by click, by ctypes, and by whoever wrote a glTF file."""
 

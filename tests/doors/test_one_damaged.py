@@ -14,10 +14,7 @@ from labcrane.cli.app import main
 COMMANDS = {
     "report": ("report",),
     "score": ("score",),
-    **{
-        to: ("export", "--to", to)
-        for to in ("tables", "bids", "matlab", "lerobot", "robomimic", "zip")
-    },
+    **{to: ("export", "--to", to) for to in ("tables", "bids", "matlab", "zip")},
 }
 ZERO_PAGE = 4096
 

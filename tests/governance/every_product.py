@@ -34,7 +34,7 @@ STUDY = GOVERNED.replace(
     "title:", "participants: {pattern: '(P\\d{3,4})|(VP-\\d{3})', planned: 4}\ntitle:"
 )
 VIEW = "views: {operator: {use: view, renderer: software, size: [160, 90]}}\n"
-EXPORTS = ("tables", "psychds", "matlab", "bids", "xdf", "zip", "lerobot", "robomimic")
+EXPORTS = ("tables", "psychds", "matlab", "bids", "xdf", "zip")
 
 
 RUN: set[str] = set()

@@ -102,15 +102,6 @@ def _may_run_in_real_time() -> bool:
     return _succeeds(sys.executable, "-c", asked)  # in a process of its own: it would stay so
 
 
-LEARNERS = "LABCRANE_LEARNERS"
-"""Names the Python of an environment with what learns, which brings torch."""
-
-
-def _learner_has(package: str) -> bool:
-    asked = f"import sys, importlib.util as u; sys.exit(u.find_spec({package!r}) is None)"
-    return LEARNERS in os.environ and _succeeds(os.environ[LEARNERS], "-c", asked)
-
-
 GRAPHICS = tuple(LIBRARIES)
 """What any picture is drawn with, a hidden one by the software renderer too."""
 
@@ -164,14 +155,6 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
         "pip install pupil-apriltags",
     ),
     "numba": (lambda: find_spec("numba") is not None, "pip install 'labcrane[fast]'"),
-    "lerobot": (
-        lambda: _learner_has("lerobot"),
-        f"pip install lerobot into an environment of its own, and name its Python in {LEARNERS}",
-    ),
-    "robomimic": (
-        lambda: _learner_has("robomimic"),
-        f"pip install robomimic into an environment of its own, and name its Python in {LEARNERS}",
-    ),
     "alsa.conf": (
         lambda: Path("/usr/share/alsa/alsa.conf").exists(),
         "apt install libasound2-data",  # PortAudio ends the process without it

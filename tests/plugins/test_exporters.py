@@ -8,9 +8,7 @@ from labcrane.testing import ExporterContract, ch8
 
 
 class TestExporters(ExporterContract):
-    @pytest.fixture(
-        params=["tables", "psychds", "matlab", "bids", "xdf", "zip", "lerobot", "robomimic"]
-    )
+    @pytest.fixture(params=["tables", "psychds", "matlab", "bids", "xdf", "zip"])
     def exporter(self, request: pytest.FixtureRequest) -> Exporter:
         offer = discover().find(Exporter, request.param)
         needed = {"license": "CC0-1.0"} if offer.name == "zip" else {}

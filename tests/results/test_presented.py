@@ -3,14 +3,12 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pandas as pd
 import pytest
 
 import labcrane as lab
 from labcrane.analysis.codebook import trial_codebook
-from labcrane.analysis.cohort import Participant, Status
 from labcrane.analysis.measures import measure_session
 from labcrane.analysis.presented import (
     PRESENTED,
@@ -34,10 +32,6 @@ from labcrane.streams.feedback_log import log_name
 from labcrane.streams.recorder.health import Flow, rate_of
 from labcrane.streams.sync.report.sync_report import SyncReport
 from labcrane_bids.events import event_description, event_table
-from labcrane_learning.episodes import episodes_of, layout_of
-from labcrane_learning.lerobot import LeRobot
-from labcrane_learning.robomimic import NAME, Robomimic
-from labcrane_learning.settings import EpisodeSettings
 from results.recorded import STUDY, record, study
 from results.synthetic import cohort_of_36
 
@@ -212,29 +206,6 @@ def test_labels_and_events_of_bids_name_movements_that_were_not_shown(
     assert not table.loc[~of_it, "label"].str.contains("presentation_failed").any()
     meaning = event_description(table, session.context, {})["presentation_failed"]["Description"]
     assert meaning == PRESENTED["presentation_failed"][1]
-
-
-@pytest.mark.slow
-def test_an_episode_of_which_too_little_was_shown_is_no_success(
-    stopped: tuple[SessionRecord, pd.Series], tmp_path: Path
-) -> None:
-    session, third = stopped
-    person = Participant("P001", session._path, Status.COMPLETE, "")
-    found = {each.trial: each for each in episodes_of(person, layout_of(session), "")}
-    wrong = found.pop(int(third["trial"]))
-    assert (wrong.presentation_failed, wrong.success) == (True, False)
-    assert {(each.presentation_failed, each.success) for each in found.values()} == {(False, True)}
-    assert wrong.skill == 1.0, "of the attempts that were shown"
-    Robomimic(EpisodeSettings()).export(iter([person]), tmp_path)
-    with h5py.File(tmp_path / NAME) as file:
-        demos = {demo: file["data"][demo].attrs["presentation_failed"] for demo in file["data"]}
-        shown = {demo for demo, failed in demos.items() if not failed}
-        assert {name.decode() for name in file["mask/success"][:]} == shown
-        assert len(demos) == len(shown) + 1
-    LeRobot(EpisodeSettings()).export(iter([person]), tmp_path / "lerobot")
-    episodes = pd.read_parquet(tmp_path / "lerobot/meta/episodes/chunk-000/file-000.parquet")
-    assert episodes.loc[episodes["presentation_failed"], "trial"].tolist() == [third["trial"]]
-    assert (episodes["success"] == ~episodes["presentation_failed"]).all()
 
 
 def test_a_report_and_the_study_page_tell_time_stamps_from_what_was_shown(

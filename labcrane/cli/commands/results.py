@@ -45,9 +45,7 @@ def export(
     data: StudyData,
     to: Annotated[
         str,
-        typer.Option(
-            help="tables, matlab, bids, psychds, xdf, zip, lerobot, robomimic; see labcrane plugins"
-        ),
+        typer.Option(help="tables, matlab, bids, psychds, xdf, zip; see labcrane plugins"),
     ],
     folder: Annotated[Path, typer.Option("--out", help="an empty or new folder")],
     include: Include = None,
