@@ -30,7 +30,6 @@ MODULES = {
     "check": ("start", "new_study", "check", "plan", "pages"),
     "doctor": ("doctor", "report_problem"),
     "plugins": ("schema", "new_plugin"),
-    "language_server": ("language_server",),
     "record": ("streams", "record", "recover", "resync"),
     "score": ("score",),
     "results": ("export", "report", "replay", "view"),

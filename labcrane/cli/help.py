@@ -10,7 +10,7 @@ SECTIONS = {
     "Prepare a study": (
         "start", "new-study", "check", "plan", "pages", "doctor", "report-problem", "feedback",
         "simulate", "power", "tracks", "approve", "amend", "methods", "bundle", "plugins",
-        "new-plugin", "schema", "language-server",
+        "new-plugin", "schema",
     ),
     "Run": ("demo", "run", "resume", "consent", "streams", "record"),
     "Analyse": ("view", "report", "score", "export", "replay"),

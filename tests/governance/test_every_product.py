@@ -227,7 +227,7 @@ LOOKS = {
 }
 """They show what there is, and end: with what they are called here."""
 
-PAGES = {"study", "view", "pages", "language-server"}
+PAGES = {"study", "view", "pages"}
 """They show what there is until they are stopped."""
 
 

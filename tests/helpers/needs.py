@@ -141,10 +141,6 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
         lambda: shutil.which("bids-validator-deno", path=Path(sys.executable).parent) is not None,
         "pip install bids-validator-deno",
     ),
-    "yaml-language-server": (
-        lambda: shutil.which("yaml-language-server") is not None,
-        "npm install --global yaml-language-server@1.25.0",  # as .ci/run has it
-    ),
     "axe-core": (
         lambda: node_module("axe-core") is not None,
         "npm install --global axe-core@4.14.1",  # as .ci/run has it

@@ -130,7 +130,7 @@ def check(
 def examined(
     protocol: Path, *, simulated: bool = False
 ) -> "tuple[Study, tuple[CheckQuestion, ...]]":
-    """Return a study and its warnings: the same for a terminal, a program and an editor.
+    """Return a study and its warnings: the same for a terminal and a program.
 
     Raises
     ------
