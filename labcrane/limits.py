@@ -136,7 +136,7 @@ LIMITS: Mapping[str, Limit] = {
         "files.table",
         ERROR,
     ),
-    "mesh": Limit(100_000_000, "bytes", 0, "STL, OBJ or glTF 2", "machines.meshes.reader", ERROR),
+    "mesh": Limit(100_000_000, "bytes", 0, "STL or OBJ", "machines.meshes.reader", ERROR),
     "triangles of a mesh": Limit(
         2_000_000,
         "triangles",
@@ -144,9 +144,6 @@ LIMITS: Mapping[str, Limit] = {
         "finite points, corners that are there",
         "machines.meshes.surface",
         ERROR,
-    ),
-    "values of a mesh": Limit(
-        1_000_000, "values", 0, "JSON of glTF 2", "machines.meshes.gltf", ERROR
     ),
     "robot description": Limit(
         5_000_000,

@@ -136,8 +136,8 @@ def verify(study: Study, registry: Registry, today: date) -> Lock:
         raise ProtocolError(
             f"{study.path} was approved under {lock.approval['reference']!r} with other packages, "
             f"and specifies environment: refuse:\n{listed}\n"
-            "install the approved packages, for example from the study's bundle; record the "
-            "change with labcrane amend; or use --pilot"
+            "install the approved packages; record the change with labcrane amend; or use "
+            "--pilot"
         )
     return lock
 

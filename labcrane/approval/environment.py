@@ -56,17 +56,13 @@ def _environment(path: tuple[str, ...]) -> dict[str, Any]:
     }
 
 
-def installed(path: Sequence[str]) -> Iterator[Distribution]:
-    """Yield each package on a path once: of two the first, which is the one that is imported.
-
-    Remains of an interrupted installation have no name and are not packages: on Windows, where
-    files in use cannot be removed, such folders are common.
-    """
-    return (each for _, _, each in _named(path))
-
-
 def _named(path: Sequence[str]) -> Iterator[tuple[str, str | None, Distribution]]:
-    """Yield each package with its name, by PEP 503, and its version."""
+    """Yield each package once with its name, by PEP 503, and its version.
+
+    Of two the first, which is the one that is imported. Remains of an interrupted installation have
+    no name and are not packages: on Windows, where files in use cannot be removed, such folders are
+    common.
+    """
     seen: set[str] = set()
     for each in distributions(path=list(path)):
         about = each.read_text("METADATA") or each.read_text("PKG-INFO") or each.read_text("")
@@ -81,7 +77,7 @@ def _named(path: Sequence[str]) -> Iterator[tuple[str, str | None, Distribution]
 def fingerprint(of: Distribution) -> str | None:
     """Return a hash of a package's content, equal wherever the same wheel is installed."""
     record = of.read_text("RECORD")
-    if record is None or is_working_copy(of):
+    if record is None or _is_working_copy(of):
         return None
     return fingerprint_of(record)
 
@@ -105,15 +101,9 @@ def _counted(record: str) -> Iterator[tuple[str, str]]:
             yield f"{folder}/{file}", digest
 
 
-def is_working_copy(of: Distribution) -> bool:
-    """Return whether a package is imported from a working copy."""
-    return bool(source(of).get("dir_info", {}).get("editable"))
-
-
-def source(of: Distribution) -> dict[str, Any]:
-    """Return where a package was installed from, if not from an index; else nothing."""
-    found: dict[str, Any] = json.loads(of.read_text("direct_url.json") or "{}")
-    return found
+def _is_working_copy(of: Distribution) -> bool:
+    source = json.loads(of.read_text("direct_url.json") or "{}")
+    return bool(source.get("dir_info", {}).get("editable"))
 
 
 def changes(before: Environment, now: Environment) -> list[str]:

@@ -1,13 +1,11 @@
 """Everything that a protocol refers to, as plain data that can be compared and hashed."""
 
 import hashlib
-import json
 import os
 from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 from xml.etree import ElementTree
 
 from labcrane.approval.source_tree import hashes
@@ -28,9 +26,6 @@ NAMELESS = frozenset({".obj", ".stl", ".pdf"})
 
 MOST_TEXT = 1_000_000
 """Bytes of a file of no known kind that may be YAML and name others."""
-
-MOST_JSON = 100_000_000
-"""Bytes of a mesh's description."""
 
 ROBOTS = frozenset({".urdf", ".xml"})
 OF_THE_LAB = frozenset({"certificate", "key"})
@@ -169,33 +164,9 @@ def _named_in(path: Path) -> Any:
         return _parsed(path.read_text(encoding="utf-8"))
     if path.suffix in ROBOTS:
         return list(_named_by_robot(path))
-    if path.suffix == ".gltf":  # names its textures and its numbers
-        try:
-            return _unquoted(json.loads(path.read_text(encoding="utf-8")))
-        except (ValueError, RecursionError) as error:
-            raise ProtocolError(f"{path} is not glTF: {str(error)[:100]}; export it") from error
-    if path.suffix == ".glb":
-        return _named_in_glb(path)
     if path.suffix in NAMELESS or (text := _short_text(path)) is None:
         return None
     return _parsed(text)  # whatever it is called
-
-
-def _unquoted(data: object) -> list[str]:
-    """Return texts of a glTF file as the addresses and as the names that they may be."""
-    texts = list(_strings(data))
-    return [*texts, *map(unquote, texts)]
-
-
-def _named_in_glb(path: Path) -> Any:
-    """Return the names in a binary glTF file: its first chunk is JSON, after 12 and 8 bytes."""
-    with path.open("rb") as file:
-        head = file.read(20)
-        size = int.from_bytes(head[12:16], "little")
-        try:
-            return _unquoted(json.loads(file.read(min(size, MOST_JSON))))
-        except (ValueError, RecursionError) as error:
-            raise ProtocolError(f"{path} is not glTF: {str(error)[:100]}; export it") from error
 
 
 def _short_text(path: Path) -> str | None:

@@ -33,8 +33,8 @@ MODULES = {
     "record": ("streams", "record", "recover", "resync"),
     "score": ("score",),
     "results": ("export", "report", "replay", "view"),
-    "simulate": ("simulate", "power", "tracks"),
-    "approval": ("approve", "amend", "methods", "bundle"),
+    "simulate": ("simulate", "power"),
+    "approval": ("approve", "amend", "methods"),
     "participants": (
         "participants", "study", "consent", "exclude", "note", "waive", "deviations",
     ),

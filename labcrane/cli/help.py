@@ -9,7 +9,7 @@ from typer.core import TyperCommand, TyperGroup
 SECTIONS = {
     "Prepare a study": (
         "start", "new-study", "check", "plan", "pages", "doctor", "report-problem", "feedback",
-        "simulate", "power", "tracks", "approve", "amend", "methods", "bundle", "plugins",
+        "simulate", "power", "approve", "amend", "methods", "plugins",
         "new-plugin", "schema",
     ),
     "Run": ("demo", "run", "resume", "consent", "streams", "record"),

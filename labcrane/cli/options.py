@@ -43,14 +43,6 @@ def one_study(data: Path | None, study: Path | None = None) -> Path:
     return study or data or data_here()
 
 
-ProtocolPath = Annotated[
-    Path,
-    typer.Argument(
-        metavar="PROTOCOL",
-        help=STUDY,
-        callback=protocol_in,
-    ),
-]
 ProtocolHere = Annotated[
     Path,
     typer.Argument(

@@ -9,7 +9,7 @@ from .library import load_machine
 from .links import link_boxes
 from .machine import GRAVITY, Body, Joint
 from .meshes.mesh_file import MeshFile
-from .meshes.reader import read_surfaces
+from .meshes.reader import read_surface
 from .meshes.solids import in_frame, read_solids, turned
 from .meshes.surface import MeshError, Surface
 from .rotation import rotation_matrix
@@ -50,7 +50,7 @@ __all__ = [
     "reach",
     "read_placed",
     "read_solids",
-    "read_surfaces",
+    "read_surface",
     "rotation_matrix",
     "segments",
     "stands",

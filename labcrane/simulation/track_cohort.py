@@ -110,18 +110,13 @@ def abilities(
 
     Chance and lapses are those that QUEST+ believes in; with a staircase there are none.
 
-    Raises
-    ------
-    ProtocolError
-        No spread is given for a staircase, which knows of none.
+    Parameters
+    ----------
+    spreads
+        For a staircase; empty for QUEST+, which has its own.
     """
     law = track.settings.quest_plus
     spreads = spreads or (law.spreads if law is not None else ())
-    if not spreads:
-        raise ProtocolError(
-            f"track {track.name!r} is a staircase, which does not specify how steeply success "
-            "falls with the level; give --spread, in the levels' unit"
-        )
     random = np.random.default_rng(seed)
     numbers = list(track.settings.levels.values())
     thresholds = random.uniform(min(numbers), max(numbers), operators).tolist()
@@ -172,7 +167,7 @@ def quality(track: PlannedTrack, found: "pd.DataFrame") -> TrackQuality:
     if count < LEAST:
         raise ProtocolError(
             f"track {track.name!r} has an estimate of {count} of {len(found)} operators, and bias "
-            f"needs {LEAST}; allow more rounds or fewer reversals, or take more --operators"
+            f"needs {LEAST}; allow more rounds or fewer reversals"
         )
     bias, spread = float(errors.mean()), float(errors.std(ddof=1))
     reach = float(t.ppf(0.975, count - 1)) * spread / count**0.5
@@ -182,26 +177,6 @@ def quality(track: PlannedTrack, found: "pd.DataFrame") -> TrackQuality:
         bias + reach, spread, bias / spread, float(errors[:end].mean()),
         float(errors[-end:].mean()), float(found["trials"].mean()), float(found["ended"].mean()),
     )  # fmt: skip
-
-
-def paragraph(found: Sequence[TrackQuality]) -> str:
-    """Return the paragraph on tracks for an application to an ethics board."""
-    sentences = []
-    for each in found:
-        none = f"; of {each.without} there was no estimate" if each.without else ""
-        sentences.append(
-            f"Levels of {each.track!r} are chosen by {each.by}. With {each.operators} simulated "
-            f"operators whose thresholds are known, its estimate was off by {each.bias:.3g} on "
-            f"average (95 % interval {each.bias_low:.3g} to {each.bias_high:.3g}), with a standard "
-            f"deviation of {each.spread:.3g}, after {each.trials:.1f} trials{none}; by "
-            f"{each.bias_lowest:.3g} in the tenth with the lowest thresholds, and by "
-            f"{each.bias_highest:.3g} in that with the highest."
-        )
-    sentences.append(
-        "The simulated operators are a model; the numbers hold for people only as far as the model "
-        "does."
-    )
-    return " ".join(sentences)
 
 
 def judged(name: str, described: str) -> "pd.DataFrame":

@@ -230,24 +230,6 @@ def test_a_file_that_is_named_through_a_link_to_the_folder_is_in_the_approval(
     assert materials(study, registry)["files"] != before
 
 
-def test_numbers_of_a_mesh_are_in_the_approval_as_its_addresses_say(tmp_path: Path) -> None:
-    """An address has %20 where a file has a space, and a binary file names others as well."""
-    import json
-
-    from labcrane.approval.materials import referred
-
-    tree = json.dumps({"buffers": [{"uri": "my%20numbers.bin"}]}).encode()
-    (tmp_path / "my numbers.bin").write_bytes(b"123")
-    (tmp_path / "a.gltf").write_bytes(tree)
-    chunk = len(tree).to_bytes(4, "little") + b"JSON" + tree
-    (tmp_path / "b.glb").write_bytes(
-        b"glTF\2\0\0\0" + (12 + len(chunk)).to_bytes(4, "little") + chunk
-    )
-    (tmp_path / "scene.any").write_text("mesh: b.glb\n", encoding="utf-8")
-    for named in ("a.gltf", "b.glb", "scene.any"):
-        assert tmp_path / "my numbers.bin" in referred([named], tmp_path), named
-
-
 @pytest.mark.parametrize(
     ("section", "key", "said"),
     [

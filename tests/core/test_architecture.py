@@ -244,9 +244,9 @@ def test_only_the_search_asks_liblsl_who_is_there() -> None:
 
 
 ASKED_FOR_BY_OTHERS = {
-    "get_code", "format_commands", "_fields_", "asset",
+    "get_code", "format_commands", "_fields_",
 }  # fmt: skip
-"""By Python's import, by click, by ctypes, and by whoever wrote a glTF file."""
+"""By Python's import, by click, and by ctypes."""
 
 
 def defined(module: Path) -> Iterator[str]:

@@ -17,7 +17,7 @@ from labcrane import LabcraneError
 from labcrane.core.items import AnswerError
 from labcrane.files.yaml import parse_yaml
 from labcrane.limits import LIMITS, LimitError
-from labcrane.machines import MeshError, read_surfaces
+from labcrane.machines import MeshError, read_surface
 from labcrane.protocol.study import Study
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.recording.xdf.reader import read_xdf
@@ -202,10 +202,8 @@ DOORS = {
     "yaml": (yaml, 500, (b"&a ", b"*a", b"<<: ", b"!!python/name:os", b"- - - ", b"? ", b"|\n")),
     "dbc": (file("panel.dbc", signal_names), 150, (b"SG_", b"BO_ ", b"@1-", b"m0", b"M")),
     "people": (file("people.csv", people_table), 800, (b"\x1f\x8b", b"\t", b";", b'""')),
-    "stl": (file("a.stl", read_surfaces), 300, (b"vertex", b"endfacet", b"solid", b"inf")),
-    "obj": (file("a.obj", read_surfaces), 400, (b"\nf ", b"\nv ", b"/", b"\\\n", b"-1", b"inf")),
-    "glb": (file("a.glb", read_surfaces), 500, (b'"count"', b"-1", b"[0,0]", b"2147483648")),
-    "gltf": (file("a.gltf", read_surfaces), 400, (b'"uri"', b"null", b"[[", b"1e308", b'"../a"')),
+    "stl": (file("a.stl", read_surface), 300, (b"vertex", b"endfacet", b"solid", b"inf")),
+    "obj": (file("a.obj", read_surface), 400, (b"\nf ", b"\nv ", b"/", b"\\\n", b"-1", b"inf")),
     "recordings": (file("boom.csv", read_recordings), 200, (b"\x1f\x8b", b"inf", b"250", b'"')),
 }  # fmt: skip
 REFUSALS = (LabcraneError, MeshError, AnswerError, LimitError, MessageError)

@@ -93,8 +93,7 @@ def test_another_version_of_a_package_is_refused_by_its_name(
     assert first.endswith("with other packages, and specifies environment: refuse:")
     assert difference == "  winch was 1.0, is 2.0"
     assert todo == (
-        "install the approved packages, for example from the study's bundle; record the "
-        "change with labcrane amend; or use --pilot"
+        "install the approved packages; record the change with labcrane amend; or use --pilot"
     )
 
 

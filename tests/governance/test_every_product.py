@@ -211,8 +211,8 @@ IN_THE_DATA_FOLDER = {
 """They write recordings and the register, which is where erasing begins."""
 
 OF_NOBODY = {
-    "demo", "simulate", "tracks", "doctor", "approve", "amend", "methods",
-    "bundle", "report-problem", "schema", "start", "new-study", "new-plugin", "streams", "record",
+    "demo", "simulate", "doctor", "approve", "amend", "methods",
+    "report-problem", "schema", "start", "new-study", "new-plugin", "streams", "record",
     "gateway can", "dmd fit", "dmd plot", "dmd record", "dmd validate",
 }  # fmt: skip
 """They write of simulated operators, a computer, a machine or a protocol, and no pseudonym."""

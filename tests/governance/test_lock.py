@@ -42,6 +42,16 @@ def test_white_space_comments_and_line_ends_are_no_drift(lab: Lab) -> None:
     assert refusal(lab) == []
 
 
+def test_the_labs_certificate_and_key_are_in_no_lock(lab: Lab) -> None:
+    with lab.protocol.open("a", encoding="utf-8") as file:
+        file.write("page: {certificate: lab.pem, key: lab.key, logo: crane.svg}\n")
+    for name in ("lab.pem", "lab.key", "crane.svg"):
+        (lab.folder / name).write_text(f"<svg>what is in {name}\n", encoding="utf-8")
+    files = materials(lab.study, lab.registry)["files"]
+    assert "crane.svg" in files
+    assert "what is in lab" not in str(files)
+
+
 def test_one_number_in_the_protocol_is_refused_with_its_name(lab: Lab) -> None:
     edit(lab.protocol, "movements: 1", "movements: 2")
     assert refusal(lab) == ["protocol: tasks.aiming.movements was 1, is 2"]

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 from labcrane import InputDevice, ProtocolError, Run, Signal, Task
 from labcrane.core import Event, Phase, PlannedTrial
 from labcrane.machines import load_scene, place_objects
-from labcrane.machines.meshes.reader import read_surfaces
+from labcrane.machines.meshes.reader import read_surface
 from labcrane.machines.scene_part import load_part
 from labcrane.testing import (
     InputContract,
@@ -174,7 +174,8 @@ def test_a_part_that_is_drawn_by_a_mesh_is_touched_where_it_is_seen() -> None:
     (stone,) = load_part(RETRIEVAL / "scenes" / "parts" / "boulder.yaml").shapes.values()
     assert stone.mesh is not None
     touched = ConvexHull(np.array(stone.points))
-    corners = np.concatenate([one.points[one.faces] for one in read_surfaces(stone.mesh.file)])
+    surface = read_surface(stone.mesh.file)
+    corners = surface.points[surface.faces]
     beyond = corners.reshape(-1, 3) @ touched.equations[:, :3].T + touched.equations[:, 3]
     assert beyond.max() < 1e-6
     # A closed surface that turns outwards has this volume (divergence theorem).

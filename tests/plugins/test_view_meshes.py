@@ -1,7 +1,5 @@
 """Meshes and scenes in the view: read alike from every format, drawn where they are."""
 
-import base64
-import json
 import math
 import struct
 from dataclasses import replace
@@ -49,43 +47,7 @@ def obj() -> bytes:
     return (points + "".join("f {} {} {}\n".format(*(face + 1)) for face in FACES)).encode()
 
 
-NUMBERS = POINTS.astype("<f4").tobytes() + FACES.astype("<u2").tobytes()
-
-
-def gltf(**buffer: str) -> dict[str, object]:
-    views = [
-        {"buffer": 0, "byteOffset": start, "byteLength": n} for start, n in ((0, 48), (48, 24))
-    ]
-    ends = {"min": POINTS.min(axis=0).tolist(), "max": POINTS.max(axis=0).tolist()}
-    return {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "buffers": [{"byteLength": len(NUMBERS), **buffer}],
-        "bufferViews": views,
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", **ends},
-            {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
-        ],
-    }
-
-
-def whole_gltf() -> bytes:
-    uri = "data:application/octet-stream;base64," + base64.b64encode(NUMBERS).decode()
-    return json.dumps(gltf(uri=uri)).encode()
-
-
-def glb() -> bytes:
-    text = json.dumps(gltf()).encode()
-    text += b" " * (-len(text) % 4)
-    head = struct.pack("<III", 0x46546C67, 2, 28 + len(text) + len(NUMBERS))
-    chunks = ((text, 0x4E4F534A), (NUMBERS, 0x004E4942))
-    return head + b"".join(struct.pack("<II", len(part), kind) + part for part, kind in chunks)
-
-
-KINDS = {"a.stl": stl, "b.stl": ascii_stl, "c.obj": obj, "d.gltf": whole_gltf, "e.glb": glb}
+KINDS = {"a.stl": stl, "b.stl": ascii_stl, "c.obj": obj}
 
 
 def written(folder: Path, name: str) -> Path:
@@ -171,7 +133,7 @@ def a_machine_study(folder: Path, mesh: str) -> Path:
             "cut.stl",
             r"mine\.yaml:\d+:\d+: .*cut\.stl' states that it has 4 triangles but has room for 3.96",
         ),
-        ("arm.step", r"'.*arm\.step' is not a mesh file; use \.stl, \.obj, \.gltf, \.glb"),
+        ("arm.step", r"'.*arm\.step' is not a mesh file; use \.stl, \.obj"),
         ("{file: a.stl, scale: -1}", r"mesh\.scale is -1; it must be greater than 0"),
     ],
 )
@@ -185,11 +147,10 @@ def test_a_protocol_with_a_wrong_mesh_is_refused(mesh: str, why: str, tmp_path: 
 
 def test_meshes_are_part_of_what_is_approved(tmp_path: Path) -> None:
     (tmp_path / "cranes").mkdir()
-    (tmp_path / "cranes" / "x.gltf").write_text(json.dumps(gltf(uri="x.bin")), encoding="utf-8")
-    (tmp_path / "cranes" / "x.bin").write_bytes(NUMBERS)
-    protocol = a_machine_study(tmp_path, "{file: x.gltf, scale: 0.5}")
+    written(tmp_path / "cranes", "a.stl")
+    protocol = a_machine_study(tmp_path, "{file: a.stl, scale: 0.5}")
     named = referred({"machine": "cranes/mine.yaml"}, protocol.parent)
-    assert {path.name for path in named} == {"mine.yaml", "x.gltf", "x.bin"}
+    assert {path.name for path in named} == {"mine.yaml", "a.stl"}
 
 
 def meshed(folder: Path, **settings: object) -> Machine:

@@ -1,12 +1,9 @@
 """Bias and spread of adaptive levels, from simulated people whose thresholds are known."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
 
-from labcrane.cli.app import main
 from labcrane.core.records import PlannedTrial
 from labcrane.design.tracks import PlannedTrack, plan_rounds
 from labcrane.design.up_down import settles_at
@@ -89,88 +86,3 @@ def test_chance_and_lapses_are_the_ends_of_what_is_likely() -> None:
     assert person.success(-100.0) == pytest.approx(0.9)
     assert person.success(100.0) == pytest.approx(0.2)
     assert person.success(5.0) == pytest.approx(0.55)
-
-
-STUDY = """\
-labcrane: 1
-study: tracks
-title: Tracks
-machine: ch8
-input: {use: dual_joystick}
-scheme:
-  use: joint_velocity
-  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}
-dynamics: {use: kinematic_crane}
-tasks: {aiming: {use: aiming, distances: [1, 2, 3, 4, 5, 6], movements: 2}}
-design:
-  tracks:
-    quest:
-      factor: pairs
-      levels: &levels
-        {1m_far_left: 1, 2m_far_left: 2, 3m_far_left: 3, 4m_far_left: 4, 5m_far_left: 5}
-      quest_plus: {spreads: [0.5, 1]}
-      rounds: 12
-    stairs:
-      factor: pairs
-      levels: *levels
-      up_down: {}
-      rounds: 30
-sessions:
-  - name: one
-    steps:
-      - block: {task: aiming, track: quest}
-      - block: {task: aiming, track: stairs}
-"""
-
-
-@pytest.mark.slow
-def test_the_command_tells_bias_and_spread_and_is_the_same_again(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "protocol.yaml"
-    path.write_text(STUDY)
-    words = ["tracks", str(path), "--operators", "200", "--spread", "0.7"]
-    for name in ("one", "two"):
-        assert main([*words, "--out", str(tmp_path / name)]) == 0
-    said = capsys.readouterr().out
-    assert "SIMULATED" in said
-    table = pd.read_csv(tmp_path / "one" / "tracks.csv").set_index("track")
-    people = pd.read_csv(tmp_path / "one" / "operators.csv")
-    for name, own in people.groupby("track"):
-        errors = (own["estimate"] - own["truth"]).dropna()
-        assert table.loc[name, "bias"] == pytest.approx(errors.mean())
-        assert table.loc[name, "spread"] == pytest.approx(errors.std())
-    assert (people["spread"] == 0.7).all()
-    assert (
-        "Levels of 'quest' are chosen by QUEST+. With 200 simulated operators"
-        in (tmp_path / "one" / "tracks.md").read_text()
-    )
-    assert (tmp_path / "one" / "tracks.png").stat().st_size > 5000
-    for file in ("tracks.csv", "operators.csv", "tracks.md"):
-        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("text", "words", "message"),
-    [
-        (STUDY, [], "track 'stairs' is a staircase, which does not specify how steeply"),
-        (STUDY, ["--spread", "0"], "--spread 0 is not a spread; give numbers above 0"),
-        (STUDY.replace(", track: quest", "").replace(", track: stairs", ""), [], "has a track"),
-        (
-            STUDY.replace("rounds: 12", "rounds: 2")
-            .replace("rounds: 30", "rounds: 2")
-            .replace("up_down: {}", "up_down: {reversals: 2}"),
-            ["--spread", "1"],
-            "'stairs' has an estimate of 0 of 50 operators, and bias needs 20",
-        ),
-    ],
-)
-def test_what_cannot_be_told_is_refused_and_nothing_is_written(
-    tmp_path: Path, text: str, words: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "protocol.yaml"
-    path.write_text(text)
-    arguments = ["tracks", str(path), "--operators", "50", "--out", str(tmp_path / "out"), *words]
-    assert main(arguments) == 2
-    assert message in " ".join(capsys.readouterr().err.split())
-    assert not (tmp_path / "out").exists()

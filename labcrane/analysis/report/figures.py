@@ -356,19 +356,6 @@ def power_curve(table: "pd.DataFrame", whose: str) -> "Figure":
     return figure
 
 
-def thresholds(table: "pd.DataFrame") -> "Figure":
-    """Return estimates of thresholds over the true ones, a picture for each track."""
-    names = list(dict.fromkeys(table["track"]))
-    figure = new_figure(len(names))
-    for name, axes in zip(names, figure.axes, strict=True):
-        own = table[table["track"] == name].dropna(subset=["estimate"])
-        axes.plot(own["truth"], own["estimate"], ".", markersize=3, alpha=0.4)
-        ends = [own["truth"].min(), own["truth"].max()]
-        axes.plot(ends, ends, color="0.3", linewidth=1)
-        axes.set(xlabel="threshold", ylabel="estimate", title=f"{name}, simulated operators")
-    return figure
-
-
 class LoadFigure(Drawing):
     """A row for each person, a column for each measure, conditions from left to right."""
 

@@ -1,4 +1,4 @@
-"""Commands about approval: approve, amend, methods, bundle."""
+"""Commands about approval: approve, amend, methods."""
 
 from datetime import date, datetime
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labcrane.cli.options import ProtocolHere, ProtocolPath
+from labcrane.cli.options import ProtocolHere
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError
 
@@ -117,24 +117,6 @@ def methods(
     out.print(paragraph(lock), markup=False)
     write_text(path, as_csv(lock.content["codebook"]), SHARED_FILE)
     out.print(f"codebook: {path}", markup=False)
-
-
-def bundle(
-    protocol: ProtocolPath,
-    folder: Annotated[Path, typer.Argument(help="a new folder, for example on a USB stick")],
-) -> None:
-    """Write a folder that installs the study offline on a similar computer."""
-    from labcrane.approval.bundle import bundle as write
-    from labcrane.protocol.study import load
-    from labcrane.registry.registry import discover
-
-    registry = discover(study=protocol)
-    made = write(load(protocol, registry), registry, folder)
-    out.print(
-        f"{made.path}: {', '.join(made.files)}, and {made.packages} packages, {made.size_mb:.0f} "
-        f"MB; on the other computer: python {made.path.name}/install.py FOLDER",
-        markup=False,
-    )
 
 
 def read_date(text: str) -> date:

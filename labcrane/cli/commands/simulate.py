@@ -1,4 +1,4 @@
-"""Commands that rehearse a study without people: simulate, power and tracks."""
+"""Commands that rehearse a study without people: simulate and power."""
 
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from labcrane.analysis.cohort import Participant
-    from labcrane.design.tracks import PlannedTrack
     from labcrane.protocol.study import Study
     from labcrane.simulation.power import Claim, Effect, Power
     from labcrane.simulation.reported import Kind
@@ -482,86 +481,3 @@ def _write_power(folder: Path, found: "Sequence[Power]", by: _Drawn) -> None:
     power_curve(curve, whose).savefig(folder / "power.png", dpi=150)
     stamp = "DRAWN FROM RECORDINGS" if by.recorded else "SIMULATED"
     out.print(f"{stamp}: {by.shown / 'power.csv'}, power.png, movements.csv", markup=False)
-
-
-def tracks(
-    protocol: ProtocolHere,
-    folder: Annotated[Path, typer.Option("--out", help="for the tables and the plot")],
-    operators: Annotated[int, typer.Option(help="number of simulated operators", min=20)] = 1000,
-    spread: Annotated[
-        list[float] | None,
-        typer.Option(help="how steeply success falls with the level; QUEST+ has its own"),
-    ] = None,
-) -> None:
-    """Measure how well adaptive levels estimate known thresholds of simulated operators.
-
-    Simulated operators complete every track's block; the command prints bias and spread of its
-    estimates, in the unit of its levels.
-    """
-    from dataclasses import asdict
-
-    import pandas as pd
-
-    from labcrane.analysis.report.figures import thresholds
-    from labcrane.cli.output import whole_table
-    from labcrane.design.seeds import derive
-    from labcrane.errors import ProtocolError
-    from labcrane.files.atomic import make_folder, write_text
-    from labcrane.files.pseudonyms import pseudonyms
-    from labcrane.protocol.study import load
-    from labcrane.registry.registry import discover
-    from labcrane.simulation.track_cohort import abilities, observe, paragraph, quality
-
-    study = load(protocol, discover(study=protocol))
-    (name,) = pseudonyms(study.protocol.participants.pattern, 1)
-    planned = _planned_tracks(study, name)
-    if not planned:
-        raise ProtocolError(
-            f"no block of {protocol} has a track; docs/protocol.md explains how levels are chosen"
-        )
-    if wrong := [each for each in spread or () if not each > 0.0]:
-        raise ProtocolError(f"--spread {wrong[0]:g} is not a spread; give numbers above 0")
-    table = whole_table(
-        "track", "operators", "bias", "95 %", "lowest tenth", "highest tenth", "spread",
-        "bias / spread", "trials",
-    )  # fmt: skip
-    found, people = [], []
-    for each in planned:
-        seed = derive(study.protocol.study, "tracks", each.name)
-        drawn = abilities(each, operators, spread or (), seed)
-        people.append(observe(each, drawn, seed + 1).assign(track=each.name))
-        one = quality(each, people[-1])
-        found.append(one)
-        table.add_row(
-            one.track,
-            f"{one.operators - one.without}",
-            f"{one.bias:.3f}",
-            f"{one.bias_low:.3f} to {one.bias_high:.3f}",
-            f"{one.bias_lowest:.3f}",
-            f"{one.bias_highest:.3f}",
-            f"{one.spread:.3f}",
-            f"{one.bias_in_sd:.3f}",
-            f"{one.trials:.1f}",
-        )
-    make_folder(folder)
-    out.print(table)
-    everybody = pd.concat(people, ignore_index=True)
-    everybody.to_csv(folder / "operators.csv", index=False)
-    pd.DataFrame([asdict(one) for one in found]).to_csv(folder / "tracks.csv", index=False)
-    thresholds(everybody).savefig(folder / "tracks.png", dpi=150)
-    write_text(folder / "tracks.md", paragraph(found) + "\n")
-    out.print(
-        f"SIMULATED: {folder / 'tracks.csv'}, operators.csv, tracks.png, tracks.md", markup=False
-    )
-
-
-def _planned_tracks(study: "Study", name: str) -> "list[PlannedTrack]":
-    """Return each track once, with the first of its blocks."""
-    from labcrane.design.plan import plan_session
-
-    found: dict[str, PlannedTrack] = {}
-    for number in range(1, len(study.protocol.sessions) + 1):
-        for block in plan_session(study, name, number).blocks:
-            if block.track is not None:
-                found.setdefault(block.track.name, block.track)
-    return list(found.values())

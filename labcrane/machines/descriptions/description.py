@@ -48,7 +48,7 @@ class MachineDescription(StrictModel):
     """Height and width of the beams that replace links, in metres."""
 
     meshes: bool = True
-    """Whether links look like the first mesh that a URDF file gives them: STL, OBJ or glTF."""
+    """Whether links look like the first mesh that a URDF file gives them: STL or OBJ."""
 
     @model_validator(mode="after")
     def _is_one_file(self) -> "MachineDescription":

@@ -22,9 +22,9 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
     if not is_file(file):
         raise ValueError(f"there is no mesh {str(file)!r}; paths are relative to its own file")
     # What is read with needs NumPy, which a protocol without meshes does without.
-    from labcrane.machines.meshes.reader import read_surfaces  # noqa: PLC0415
+    from labcrane.machines.meshes.reader import read_surface  # noqa: PLC0415
 
-    read_surfaces(file)  # what is damaged is refused before anybody sits down
+    read_surface(file)  # what is damaged is refused before anybody sits down
     return file
 
 
@@ -32,7 +32,7 @@ class MeshFile(StrictModel):
     """Visual geometry; it does not change the collision geometry."""
 
     file: Annotated[Path, AfterValidator(_beside)]
-    """STL, OBJ or glTF; its axes are taken as they are in the file."""
+    """STL or OBJ; its axes are taken as they are in the file."""
 
     scale: PositiveFloat = 1.0
     """Metres per unit of the file: 0.001 for millimetres."""

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
 from labcrane.machines.meshes.mesh_file import MeshFile
-from labcrane.machines.meshes.reader import read_surfaces
+from labcrane.machines.meshes.reader import read_surface
 from labcrane.machines.meshes.surface import Corners, MeshError
 from labcrane.types import FloatArray
 
@@ -32,10 +32,11 @@ def read_solids(asked: MeshFile) -> list[FloatArray]:
         The file cannot be read, has more than :data:`MOST` pieces, or a piece is open or has
         hollows.
     """
-    found = []
-    for surface in read_surfaces(asked.file):
-        for number, faces in enumerate(_pieces(surface.points, surface.faces), start=1):
-            found.append(_solid(asked, number, surface.points, faces))
+    surface = read_surface(asked.file)
+    found = [
+        _solid(asked, number, surface.points, faces)
+        for number, faces in enumerate(_pieces(surface.points, surface.faces), start=1)
+    ]
     if len(found) > MOST:
         raise MeshError(
             f"mesh {str(asked.file)!r} has {len(found)} pieces, but contact allows {MOST} at most; "

@@ -3,8 +3,8 @@
 import numpy as np
 
 from labcrane import DeviceError
-from labcrane.machines import MeshError, MeshFile, Surface, in_frame, read_surfaces, turned
-from labcrane_view.scene.mesh import Mesh, flat, joined
+from labcrane.machines import MeshError, MeshFile, Surface, in_frame, read_surface, turned
+from labcrane_view.scene.mesh import Mesh, flat
 
 ROUGH = 1e-6
 
@@ -18,10 +18,9 @@ def read_mesh(asked: MeshFile) -> Mesh:
         The file cannot be read, or holds no triangles.
     """
     try:
-        surfaces = read_surfaces(asked.file)
+        mesh = _drawn(read_surface(asked.file))
     except MeshError as error:
         raise DeviceError(str(error)) from error
-    mesh = joined(*map(_part, surfaces))
     return Mesh(in_frame(asked, mesh.points), mesh.normals @ turned(asked.turn_deg).T, mesh.faces)
 
 
@@ -33,7 +32,7 @@ def painted(asked: MeshFile, usual: Paint) -> Paint:
     return usual if asked.colour is None else (*asked.colour, 1.0)
 
 
-def _part(surface: Surface) -> Mesh:
+def _drawn(surface: Surface) -> Mesh:
     """Return what is drawn: flat where the file has no normals."""
     points, faces = surface.points, surface.faces.astype(np.uint32)
     if surface.normals is None:
