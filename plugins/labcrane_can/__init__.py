@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from labcrane import InputDevice, Machine, Offer, hookimpl, offer
 from labcrane.core import Finding
 from labcrane.registry import LAB, CommandOffer, Prompt
-from labcrane_can.settings import CanSettings, ReplaySettings
+from labcrane_can.settings import CanSettings
 
 labcrane_api = 1
 
@@ -17,21 +17,13 @@ def labcrane_inputs() -> list[Offer[InputDevice]]:
 
         return CanPanel(settings, machine)
 
-    def replay(settings: ReplaySettings, machine: Machine) -> InputDevice:
-        from labcrane_can.replay import CanReplay
-
-        return CanReplay(settings, machine)
-
     def examine(settings: CanSettings, ask: Prompt | None) -> Sequence[Finding]:
         from labcrane_can import examination
 
         return examination.examine(settings, ask)
 
     needs = {"can": LAB, "cantools": LAB}
-    return [
-        offer("can", CanSettings, panel, examine, needs=needs),
-        offer("can_replay", ReplaySettings, replay, needs=needs),
-    ]
+    return [offer("can", CanSettings, panel, examine, needs=needs)]
 
 
 @hookimpl

@@ -216,15 +216,3 @@ def _unknown(interface: str) -> str:
     meant = f"did you mean {close[0]!r}? " if close else ""
     every = ", ".join(sorted(VALID_INTERFACES))
     return f"python-can has no interface {interface!r}; {meant}it has {every}"
-
-
-class ReplaySettings(ValveMap):
-    """A recorded bus, played again."""
-
-    person = False
-
-    file: StudyPath
-    """A log of candump, or in Vector's asc or blf format."""
-
-    bus: str | None = None
-    """The panel's bus, where the log has several: ``can0``, or ``1`` in Vector's formats."""

@@ -31,7 +31,6 @@ def labcrane_commands() -> list[CommandOffer]:
         CommandOffer(("dmd", "fit"), commands.fit),
         CommandOffer(("dmd", "validate"), commands.validate),
         CommandOffer(("dmd", "plot"), commands.plot),
-        CommandOffer(("dmd", "record"), commands.record),
     ]
 
 

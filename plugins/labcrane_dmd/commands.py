@@ -1,4 +1,4 @@
-"""The commands ``labcrane dmd fit``, ``validate``, ``plot`` and ``record``."""
+"""The commands ``labcrane dmd fit``, ``validate`` and ``plot``."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -8,13 +8,11 @@ from pydantic import ValidationError
 from rich.console import Console
 from rich.table import Table
 
-from labcrane import DeviceError, PluginError, ProtocolError
-from labcrane.registry import LAB, not_installed
+from labcrane import ProtocolError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
-    from labcrane_dmd.bench.steps import Sample
     from labcrane_dmd.fit.recordings import SegmentRecording
     from labcrane_dmd.fit.validation import Level
     from labcrane_dmd.model.model import Model
@@ -177,8 +175,8 @@ def _drive(
 ) -> None:
     """Drive the arm with the model's own rule between layers; leave its tables and figure."""
     from labcrane.machines import load_machine
-    from labcrane_dmd.bench.driven import arm_settings
-    from labcrane_dmd.bench.driven import drive as measure
+    from labcrane_dmd.fit.driven import arm_settings
+    from labcrane_dmd.fit.driven import drive as measure
     from labcrane_dmd.fit.figures import draw_validation
     from labcrane_dmd.fit.printed import write_printed
     from labcrane_dmd.fit.validation import summary, write_table
@@ -247,85 +245,3 @@ def plot(
         draw_speeds(loaded, read, drawn[2])
     for each in drawn:
         out.print(f"figure: {each}", markup=False)
-
-
-def record(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="folder for the recordings")],
-    segment: Annotated[str, typer.Option(help="the joint that is recorded")],
-    signal: Annotated[
-        str,
-        typer.Option(help="valve number or Message.Signal on CAN; STREAM or STREAM:CHANNEL in LSL"),
-    ],
-    angle: Annotated[
-        str, typer.Option(help="Message.Signal on CAN; STREAM or STREAM:CHANNEL in LSL")
-    ],
-    bus: Annotated[
-        str | None, typer.Option(help="a CAN bus, interface:channel, as slcan:/dev/ttyUSB0")
-    ] = None,
-    log: Annotated[
-        Path | None, typer.Option(help="a candump, asc or blf log, or a raw CSV of this command")
-    ] = None,
-    *,
-    lsl: Annotated[bool, typer.Option("--lsl", help="streams of Lab Streaming Layer")] = False,
-    map_: Annotated[
-        Path | None, typer.Option("--map", help="DBC file of the messages on the bus or in the log")
-    ] = None,
-    neutral: Annotated[float, typer.Option(help="value of a DBC signal at rest")] = 0.0,
-    full: Annotated[float, typer.Option(help="value of a DBC signal at full flow")] = 100.0,
-    bitrate: Annotated[int, typer.Option(help="bits per second of the bus")] = 250_000,
-    seconds: Annotated[float | None, typer.Option(help="stop after this time")] = None,
-) -> None:
-    """Record joint steps for ``dmd fit``: from a CAN bus, a CAN log, or LSL.
-
-    Every value is written to raw/SEGMENT.csv as it arrives. At the end, or after Ctrl-C, the values
-    are cut into runs: SEGMENT.csv contains the runs; steps/SEGMENT.csv contains every step, and why
-    a step is not a run.
-    """
-    from labcrane_dmd.bench.sources import CanValues, kept, read_bus, read_log, read_lsl, read_raw
-    from labcrane_dmd.bench.steps import cut, write_runs
-
-    if sum((bus is not None, log is not None, lsl)) != 1:
-        raise ProtocolError("name the source of the values: one of --bus, --log and --lsl")
-    if (folder / f"{segment}.csv").exists() and (log is None or log.suffix != ".csv"):
-        raise ProtocolError(
-            f"{folder / f'{segment}.csv'} already exists, and recordings are not overwritten; "
-            "give another folder"
-        )
-    of_can = not lsl and (log is None or log.suffix != ".csv")
-    if of_can and (missing := not_installed({"can": LAB, "cantools": LAB})):
-        raise PluginError(f"messages of a CAN bus {missing}")
-    raw = folder / "raw" / f"{segment}.csv"
-    samples: Iterator[Sample]
-    if lsl:
-        samples = kept(read_lsl(signal, angle, segment, seconds), raw)
-    elif log is not None and log.suffix == ".csv":
-        samples = read_raw(log)
-    elif map_ is None:
-        raise ProtocolError("a CAN bus needs a DBC file that describes its messages; add --map")
-    else:
-        values = CanValues(signal, angle, map_, full, neutral)
-        frames = read_log(log, values) if log else read_bus(bus or "", bitrate, values, seconds)
-        samples = kept(frames, raw)
-    steps = cut(_taken(samples, raw))
-    path = write_runs(steps, folder, segment)
-    table = _table("signal", "seconds", "from", "to", "left out", title=segment)
-    for step in steps:
-        ends = (f"{step.angle[0]:.2f} deg", f"{step.angle[-1]:.2f} deg")
-        table.add_row(f"{step.signal:+d}", f"{step.time[-1]:.2f}", *ends, step.left_out)
-    out.print(table)
-    out.print(f"runs: {path}", markup=False)
-
-
-def _taken(samples: "Iterator[Sample]", raw: Path) -> "list[Sample]":
-    """Return the samples until they end, or until Ctrl-C."""
-    found: list[Sample] = []
-    try:
-        for sample in samples:
-            found.append(sample)  # noqa: PERF402 - Ctrl-C keeps what has come
-    except KeyboardInterrupt:
-        out.print("stopped")
-    except DeviceError as error:
-        if raw.exists():
-            error.add_note(f"what came until then is kept; cut it into runs with --log {raw}")
-        raise
-    return found

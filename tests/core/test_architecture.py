@@ -25,12 +25,6 @@ HEAVY = {
 AIMING = str(ROOT / "protocols" / "aiming" / "protocol.yaml")
 
 
-def read_start(package: Path) -> str:
-    """Return what stands in a package's first file; nothing for what is no package."""
-    start = package / "__init__.py"
-    return start.read_text(encoding="utf-8") if start.exists() else ""
-
-
 def imported_modules(source: str) -> set[str]:
     names: set[str] = set()
     for node in ast.walk(ast.parse(source)):
@@ -172,59 +166,6 @@ def test_the_help_loads_no_model() -> None:
     assert not {"pydantic", "pluggy", "ruamel.yaml", "numpy"} & modules
 
 
-MOST_MODULES = 15
-
-
-def packages(folder: str) -> list[Path]:
-    found = [path.parent for path in (ROOT / folder).rglob("__init__.py")]
-    return sorted(path for path in found if "templates" not in path.parts)
-
-
-def test_the_top_level_shows_packages() -> None:
-    modules = {path.name for path in (ROOT / "labcrane").glob("*.py")}
-    assert modules == {"__init__.py", "__main__.py", "errors.py", "limits.py", "types.py"}
-
-
-@pytest.mark.parametrize(
-    "package",
-    packages("labcrane") + packages("plugins"),
-    ids=lambda path: str(path.relative_to(ROOT)),
-)
-def test_a_package_is_taken_in_at_a_glance(package: Path) -> None:
-    modules = {path.stem for path in package.glob("*.py")} - {"__init__"}
-    assert len(modules) <= MOST_MODULES, sorted(modules)
-
-
-@pytest.mark.parametrize("package", packages("labcrane"), ids=lambda path: path.name)
-def test_a_package_says_what_comes_in_and_what_goes_out(package: Path) -> None:
-    assert (
-        package.name == "labcrane"
-        or "In come" in read_start(package)
-        or "Input: " in read_start(package)
-        or "::" in read_start(package)
-    )
-
-
-def public_classes() -> dict[str, list[str]]:
-    """Return where each public class of core and plugins is defined, by its name."""
-    found: dict[str, list[str]] = {}
-    for folder in ("labcrane", "plugins"):
-        for module in sorted((ROOT / folder).rglob("*.py")):
-            if "templates" in module.parts:
-                continue
-            for node in ast.parse(module.read_text(encoding="utf-8")).body:
-                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                    found.setdefault(node.name, []).append(str(module.relative_to(ROOT)))
-    return found
-
-
-@pytest.mark.slow
-def test_no_two_public_classes_have_one_name() -> None:
-    found = public_classes()
-    assert len(found) > 500
-    assert {name: places for name, places in found.items() if len(places) > 1} == {}
-
-
 def test_no_import_goes_round_in_a_circle() -> None:
     graph = grimp.build_graph("labcrane")
     order = TopologicalSorter(
@@ -285,24 +226,3 @@ def test_nothing_is_defined_that_only_tests_use() -> None:
         if used[name] == 1 and not name.startswith(("__", "test_", "labcrane_"))
     }
     assert {entry.partition(": ")[2] for entry in idle} <= ASKED_FOR_BY_OTHERS, idle
-
-
-VERBS = re.compile(
-    "(Find|Read|Run|Make|Write|Open|Walk|Unpack|Play|Print|Tell|Correct|Approve)s? "
-    "|(Imports|Exports|Watches|Counts|Presents|Starts|Records|Works|Measures) (?!of)"
-)
-QUESTIONS = ("How", "What", "When", "Where", "Whether", "Which", "Who", "Why", "From", "In", "To")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("folder", ["labcrane", "plugins", "benchmarks"])
-def test_every_module_says_first_what_thing_it_is(folder: str) -> None:
-    first = {
-        str(path): (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "none")
-        for path in sorted((ROOT / folder).rglob("*.py"))
-        if "templates" not in path.parts
-    }
-    assert len(first) > 15
-    assert [path for path, said in first.items() if said == "none"] == []
-    assert {path: said for path, said in first.items() if said.split()[0] in QUESTIONS} == {}
-    assert {path: said for path, said in first.items() if VERBS.match(said)} == {}

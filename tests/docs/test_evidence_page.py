@@ -4,7 +4,6 @@ import json
 import os
 import re
 import subprocess
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -137,52 +136,3 @@ def test_no_row_of_the_record_has_passed_without_a_test() -> None:
     counted = [*RECORD["systems"]]
     counted += [one for name, one in RECORD["stages"].items() if name not in EVIDENCE.UNCOUNTED]
     assert [one for one in counted if one["ended"].startswith("passed") and not one["passed"]] == []
-
-
-def passed_pythons() -> set[str]:
-    """Pythons on which tests of a recorded run have passed."""
-    return {run["python"] for run in RECORD["systems"] if run["passed"]}
-
-
-def test_classifiers_name_the_pythons_and_systems_that_a_recorded_run_shows() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    named = {
-        each.rpartition(" :: ")[2]
-        for each in project["classifiers"]
-        if each.startswith(("Programming Language :: Python :: 3.", "Operating System ::"))
-    }
-    assert named == passed_pythons()
-
-
-SYSTEM = re.compile(r"\b(Windows|Wine|macOS)\b")
-CLAIM = re.compile(r"\b(pass(es|ed)?|tried|tested|runs|ran|works|(is|are) (re)?played|those of)\b")
-
-
-def claims(page: str, tried: set[str]) -> list[str]:
-    """Sentences that say what happens on a system where nothing was run."""
-    sentences = re.split(r"(?<=[.:;])\s+", " ".join(page.split()))
-    return [
-        each
-        for each in sentences
-        if "not tried" not in each and CLAIM.search(each) and set(SYSTEM.findall(each)) - tried
-    ]
-
-
-@pytest.mark.parametrize(
-    "claim",
-    [
-        "So a session that was recorded on Linux is replayed on Windows within rounding.",
-        "Under Wine, 3 of 3 tests of a study day passed.",
-        "It works on macOS.",
-    ],
-)
-def test_a_claim_without_a_run_is_found(claim: str) -> None:
-    assert claims(f"The gate checks types. {claim}", {"Linux"}) == [claim]
-
-
-def test_pages_claim_nothing_of_a_system_without_a_recorded_run() -> None:
-    tried = {run["system"] for run in RECORD["systems"] if run["passed"]}
-    page = EVIDENCE.COMPATIBILITY.read_text(encoding="utf-8")
-    for part in ("systems", "wheels"):
-        page = EVIDENCE.with_part(page, part, "")
-    assert claims(page, tried) == []

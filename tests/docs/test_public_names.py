@@ -7,12 +7,10 @@ number has a unit, every array its shape, every field of a record a description.
 import ast
 import inspect
 import re
-import sys
 import typing
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from itertools import pairwise
-from types import ModuleType
 
 import pytest
 from numpydoc.docscrape import NumpyDocString
@@ -180,21 +178,3 @@ def test_every_key_of_a_model_is_described(name: str) -> None:
         assert key in written, f"{name}.{key} is not described"
         if field.annotation is float:
             assert UNIT.search(written[key]), f"{name}.{key} has no unit: {written[key]}"
-
-
-def values() -> Iterator[tuple[ModuleType, str]]:
-    for module in MODULES:
-        for name in module.__all__:
-            known = f"{module.__name__}.{name}" in PUBLIC
-            if not (known or inspect.ismodule(getattr(module, name))):
-                yield module, name
-
-
-@pytest.mark.parametrize(("module", "name"), list(values()), ids=str)
-def test_every_other_name_has_a_text_below_it(module: ModuleType, name: str) -> None:
-    found = [
-        dict(texts_below(ast.parse(inspect.getsource(each)).body)).get(name)
-        for key, each in list(sys.modules.items())
-        if key.startswith("labcrane.") and getattr(each, "__file__", None) and name in vars(each)
-    ]
-    assert any(found), f"{module.__name__}.{name} has no text below its definition"

@@ -1,24 +1,21 @@
-"""A panel on a CAN bus: frames, time-outs, unplugging, replay, and what is no command."""
+"""A panel on a CAN bus: frames, time-outs, unplugging, and what is no command."""
 
-import random
 import re
 import time
 from pathlib import Path
 
 import can
-import numpy as np
 import pytest
 from slcan_adapter import SlcanAdapter
 
-from labcrane import InputDevice, ProtocolError, Tick
+from labcrane import InputDevice, Tick
 from labcrane.testing import InputContract, ch8, make_frame, make_run
 from labcrane.testing.commands import CommandContract
 from labcrane_can import labcrane_commands
 from labcrane_can.avc import ESTIMATED, FULL, FrameError, State, decode, encode, encode_flow
 from labcrane_can.command_state import PanelCommands
 from labcrane_can.panel import CanPanel
-from labcrane_can.replay import CanReplay
-from labcrane_can.settings import CanSettings, ReplaySettings, ValveMap
+from labcrane_can.settings import CanSettings, ValveMap
 
 RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
 VALVES = {"slew": 1, "shoulder": 2, "elbow": 3, "wrist": 4}
@@ -61,33 +58,6 @@ class TestCommands(CommandContract):
     @pytest.fixture(params=labcrane_commands(), ids=lambda offered: " ".join(offered.words))
     def command(self, request):
         return request.param
-
-
-class TestCanReplay(InputContract):  # "can_replay"
-    goes_on = True
-
-    @pytest.fixture
-    def device(self, tmp_path: Path) -> InputDevice:
-        return CanReplay(ReplaySettings(file=a_log(tmp_path / "a.log"), valves=VALVES), ch8())
-
-
-def a_log(path: Path, seed: int = 2) -> Path:
-    random = np.random.default_rng(seed)
-    with can.Logger(path) as log:
-        for number in range(400):
-            level = int(random.integers(-250, 251))
-            # Times that every format can hold, and that do not fall on ticks.
-            log(message(*encode(1 + number % 4, level, 0x25), at=1000.0 + 0.0101 * number))
-    return path
-
-
-def commands_of(device: InputDevice, ticks: int) -> bytes:
-    run = make_run(ch8(), axes=device.signals)
-    device.open(run)
-    frame = make_frame(run)
-    read = [device.read(Tick(number, 0.0, 0.0), frame).tobytes() for number in range(ticks)]
-    device.close()
-    return b"".join(read)
 
 
 def test_every_signal_survives_the_bus_with_its_sign_from_the_state() -> None:
@@ -231,94 +201,6 @@ def test_another_node_or_priority_is_foreign_when_the_protocol_names_them() -> N
     assert commands.signals(0.0)[0][0] == 120.0
 
 
-def test_the_same_log_gives_the_same_commands_bit_for_bit_in_every_format(tmp_path: Path) -> None:
-    first = None
-    for ending in ("log", "asc", "blf"):
-        path = a_log(tmp_path / f"panel.{ending}")
-        settings = ReplaySettings(file=path, valves=VALVES)
-        for _ in range(2):
-            got = commands_of(CanReplay(settings, ch8()), 1200)
-            assert first is None or got == first, ending
-            first = got
-
-
-def test_a_candump_log_of_a_live_bus_replays_what_the_panel_was_heard_to_say(
-    tmp_path: Path,
-) -> None:
-    path = a_log(tmp_path / "live.log")
-    live = PanelCommands(ValveMap(valves=VALVES))
-    frames = list(can.LogReader(path))
-    device = CanReplay(ReplaySettings(file=path, valves=VALVES), ch8())
-    run = make_run(ch8(), axes=device.signals)
-    device.open(run)
-    waiting, start = list(frames), frames[0].timestamp
-    for number in range(900):
-        now = number / run.rate_hz
-        while waiting and round(waiting[0].timestamp - start, 6) <= now:
-            live.take(waiting[0], round(waiting.pop(0).timestamp - start, 6))
-        expected = [signal / FULL for signal in live.signals(now)[0]]
-        assert device.read(Tick(number, 0.0, 0.0), make_frame(run))[:4].tolist() == expected
-
-
-def test_an_asc_log_whose_times_count_from_frame_to_frame_is_played_at_its_pace(
-    tmp_path: Path,
-) -> None:
-    """Vector's loggers write either; python-can's reader adds nothing up."""
-    absolute = a_log(tmp_path / "panel.asc")
-    text, was = absolute.read_text(), 0.0
-    lines = text.replace("timestamps absolute", "timestamps relative").split("\n")
-    for at, line in enumerate(lines):
-        if found := re.match(r" *(\d+\.\d+)( .*)", line):
-            now = float(found[1])
-            lines[at], was = f"{now - was:11.6f}{found[2]}", now
-    relative = tmp_path / "relative.asc"
-    relative.write_text("\n".join(lines))
-    assert "timestamps relative" in relative.read_text()
-    found = [
-        commands_of(CanReplay(ReplaySettings(file=path, valves=VALVES), ch8()), 1200)
-        for path in (absolute, relative)
-    ]
-    assert found[0] == found[1]
-
-
-def test_a_log_whose_clock_was_set_back_is_refused_with_the_frame(tmp_path: Path) -> None:
-    path = a_log(tmp_path / "panel.log")
-    first, *rest = path.read_text().splitlines()
-    path.write_text("\n".join([first, *rest, first]) + "\n")
-    said = rf"the clock of .*panel.log goes back by .* s at its frame {len(rest) + 2}"
-    with pytest.raises(ProtocolError, match=said):
-        CanReplay(ReplaySettings(file=path, valves=VALVES), ch8())
-
-
-def test_what_is_no_log_is_refused_in_words(tmp_path: Path) -> None:
-    (tmp_path / "empty.log").write_text("", encoding="utf-8")
-    with pytest.raises(ProtocolError, match=r"empty.log holds no frames, so there is nothing"):
-        CanReplay(ReplaySettings(file=tmp_path / "empty.log", valves=VALVES), ch8())
-    with pytest.raises(ProtocolError, match=r"no.asc cannot be read as a candump, asc or blf log"):
-        CanReplay(ReplaySettings(file=tmp_path / "no.asc", valves=VALVES), ch8())
-
-
-# python-can leaves a damaged blf log open until it is collected.
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.filterwarnings("ignore::ResourceWarning")
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("ending", ["log", "asc", "blf", "trc"])
-def test_a_damaged_log_is_read_or_refused_in_words(tmp_path: Path, ending: str, seed: int) -> None:
-    draw = random.Random(seed)
-    whole = a_log(tmp_path / f"panel.{ending}").read_bytes()
-    flipped = bytearray(whole)
-    for _ in range(3):
-        flipped[draw.randrange(len(whole))] = draw.randrange(256)
-    path = tmp_path / f"damaged.{ending}"
-    settings = ReplaySettings(file=path, valves=VALVES)
-    for damaged in (whole[: draw.randrange(1, len(whole))], bytes(flipped), b"?" + whole):
-        path.write_bytes(damaged)
-        try:
-            CanReplay(settings, ch8())
-        except ProtocolError as error:
-            assert re.search(rf"damaged\.{ending} |the clock of .*damaged", str(error))  # noqa: PT017
-
-
 def test_a_flooded_bus_holds_the_machine_and_says_so() -> None:
     settings = CanSettings(bus="virtual:flood", valves=VALVES, most_frames_s=300)
     device = CanPanel(settings, ch8())
@@ -338,68 +220,3 @@ def test_a_flooded_bus_holds_the_machine_and_says_so() -> None:
             assert not axes.any()
         finally:
             device.close()
-
-
-def test_logs_are_read_as_people_and_loggers_write_them(tmp_path: Path) -> None:
-    """A byte order mark, comments, Windows' line ends, a header in German, and none at all."""
-    plain = {ending: a_log(tmp_path / f"plain.{ending}") for ending in ("log", "asc")}
-    text = {ending: path.read_text() for ending, path in plain.items()}
-    frames = re.sub(r"(?m)^(?! *\d+\.\d).*\n", "", text["asc"])
-    screen = re.sub(
-        r"(?m)^\((\S+)\) (\S+) (\w+)#(\w+).*$",
-        lambda m: (
-            f" ({m[1]})  {m[2]}  {m[3]}   [{len(m[4]) // 2}]  {' '.join(re.findall('..', m[4]))}"
-        ),
-        text["log"],
-    )
-    german = "date Mo M\xe4r 2 11:21:13.191 2026\nbase hex  timestamps absolute\n"
-    written = {
-        "bom.log": ("\ufeff# by hand\n; twice\n\n" + text["log"]).encode(),
-        "windows.log": text["log"].replace("\n", "\r\n").encode(),
-        "screen.log": screen.encode(),
-        "march.asc": (german + frames).encode("cp1252"),
-        "headless.asc": frames.encode(),
-    }
-    expected = commands_of(CanReplay(ReplaySettings(file=plain["log"], valves=VALVES), ch8()), 1200)
-    for name, raw in written.items():
-        (tmp_path / name).write_bytes(raw)
-        device = CanReplay(ReplaySettings(file=tmp_path / name, valves=VALVES), ch8())
-        assert commands_of(device, 1200) == expected, name
-        assert "torn" not in device.metadata()
-
-
-@pytest.mark.parametrize("ending", ["log", "asc"])
-def test_a_last_line_that_was_cut_off_is_no_frame_and_is_recorded(
-    tmp_path: Path, ending: str
-) -> None:
-    path = a_log(tmp_path / f"panel.{ending}")
-    lines = [
-        line for line in path.read_text().splitlines(keepends=True) if re.search(r"\d\.\d", line)
-    ]
-    whole = CanReplay(ReplaySettings(file=path, valves=VALVES), ch8()).metadata()["frames"]
-    frames = [line for line in lines if re.match(r"[ (]*\d+\.\d", line)]
-    path.write_text("".join(frames).rstrip()[: -random.Random(ending).randint(1, 9)])
-    told = CanReplay(ReplaySettings(file=path, valves=VALVES), ch8()).metadata()
-    assert (told["frames"], told["torn"]) == (whole - 1, 1)
-
-
-def test_the_panel_is_on_one_bus_of_a_log_that_has_several(tmp_path: Path) -> None:
-    path = a_log(tmp_path / "panel.log")
-    lines = path.read_text().splitlines()
-    (bus,) = {line.split()[1] for line in lines}
-    foreign = [
-        line.replace(f" {bus} ", " other ")
-        for line in a_log(tmp_path / "x.log", 5).read_text().splitlines()
-    ]
-    both = sorted([*lines, *foreign], key=lambda line: float(line[1:].split(")")[0]))
-    mixed = tmp_path / "mixed.log"
-    mixed.write_text("\n".join(both) + "\n")
-    with pytest.raises(
-        ProtocolError, match=r"frames of the buses .*; name the panel's, as in bus: "
-    ):
-        CanReplay(ReplaySettings(file=mixed, valves=VALVES), ch8())
-    alone, picked = (
-        commands_of(CanReplay(ReplaySettings(file=file, valves=VALVES, bus=bus), ch8()), 1200)
-        for file in (path, mixed)
-    )
-    assert alone == picked

@@ -2,18 +2,15 @@
 
 # ruff: noqa: E501 - a message is one line, as the researcher sees it
 
-import random
 import re
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
-from io import StringIO
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import matplotlib
 import pytest
 from rehearsal import SHORT
-from ruamel.yaml import YAML
 
 import labcrane
 from labcrane import ProtocolError, Settings
@@ -24,7 +21,7 @@ from labcrane.core.roles import InputDevice
 from labcrane.machines import load_machine
 from labcrane.protocol.protocol import Participants
 from labcrane.protocol.questions import questions
-from labcrane.protocol.study import Study, load
+from labcrane.protocol.study import load
 from labcrane.registry.registry import Registry, discover
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
@@ -451,103 +448,6 @@ def test_an_input_declares_the_axes_that_it_has(registry: Registry, name: str) -
     settings = offer.settings.model_validate(INPUTS[name])
     built = offer.build(settings, machine)
     assert tuple(settings.provides(machine)["axis"]) == Layout("the input", built.signals).columns
-
-
-Step = str | int
-Place = tuple[Step, ...]
-
-
-def references_of(study: Study) -> Iterator[tuple[Place, Mentioned]]:
-    """Yield every reference of a shipped protocol with its place in the file."""
-    single = ("input", "operator", "scheme", "dynamics")
-    for part in single:
-        for each in mentioned(getattr(study, part).settings):
-            yield (part, *each.place), each
-    for part, choices in (
-        ("tasks", study.task_choices),
-        ("feedback", study.cues | study.sounds),
-        ("views", study.views),
-    ):
-        for name, choice in choices.items():
-            for each in mentioned(choice.settings):
-                yield (part, name, *each.place), each
-
-
-def broken(rng: random.Random, text: str, place: Place, *, key: bool) -> tuple[str, str]:
-    """Return the protocol with one reference misspelt, removed or of the wrong kind, and which."""
-    yaml = YAML()
-    data = yaml.load(text)
-    holder: Any = data
-    for step in place[:-1]:
-        holder = holder[step]
-    last = place[-1]
-    fault = rng.choice(("misspelt", "removed", "of the wrong kind"))
-    name = str(last if key else holder[last])
-    if fault == "misspelt":
-        at = rng.randrange(len(name))
-        wrong: object = name[:at] + rng.choice("qz7") + name[at + 1 :]
-    else:
-        wrong = rng.choice((5, [1, 2], {"a": 1}, True))
-    if fault == "removed":
-        del holder[last]
-    elif key:
-        wrong = str(wrong) if not isinstance(wrong, str) else wrong
-        holder.insert(list(holder).index(last), wrong, holder.pop(last))
-    else:
-        holder[last] = wrong
-    out = StringIO()
-    yaml.width = 10_000
-    yaml.dump(data, out)
-    return out.getvalue(), fault
-
-
-REMEDY = re.compile(
-    r"there is no such \w+; .*has |no such file; did you|does not exist; |it needs one for each of |must be |needs (the |')"
-)
-
-
-OPTIONAL = {
-    ("tasks", "retrieval", "find_axis"),
-    ("operator", "button"),
-    ("scheme", "model"),
-}
-"""What a protocol may leave out."""
-
-
-def line_of(text: str, place: Sequence[Step]) -> int:
-    """Return the line of what holds a place, by the YAML library itself."""
-    node, line = YAML().load(text), 1
-    for step in place:
-        try:
-            line = (node.lc.item(step) if isinstance(step, int) else node.lc.key(step))[0] + 1
-            node = node[step]
-        except (KeyError, IndexError, TypeError, AttributeError):
-            break
-    return line
-
-
-@pytest.mark.parametrize("study", ["aiming", "retrieval"])
-@pytest.mark.parametrize("seed", range(12))
-def test_a_reference_broken_at_random_is_told_with_its_line_and_the_remedy(
-    told, registry: Registry, study: str, seed: int
-) -> None:
-    rng = random.Random(f"{study} {seed}")
-    shipped = load(PROTOCOLS / study / "protocol.yaml", registry)
-    every = [
-        (place, each) for place, each in references_of(shipped) if isinstance(each.mark, Reference)
-    ]
-    place, each = rng.choice(every)
-    text, fault = broken(
-        rng, (PROTOCOLS / study / "protocol.yaml").read_text(encoding="utf-8"), place, key=each.key
-    )
-    lines = told(study, text)
-    context = (fault, place, lines)
-    if fault == "removed" and (isinstance(place[-1], int) or place in OPTIONAL):
-        return  # a list of one less is another protocol, and may be a right one
-    assert lines, context
-    at = line_of(text, place)
-    assert any(line.startswith(f"{at}:") for line in lines) or fault == "removed", context
-    assert all(REMEDY.search(line) for line in lines), context
 
 
 def test_a_protocol_may_name_every_event_that_its_session_sends_and_no_other(told) -> None:

@@ -27,7 +27,6 @@ ANY: dict[str, str] = {
     "QuestionSettings.lowest": OWN_UNIT,
     "ForceSettings.largest": OWN_UNIT,
     "CanSettings.neutral": OWN_UNIT,
-    "ReplaySettings.neutral": OWN_UNIT,
     "Block.condition": A_NUMBER_OF,
     "PageSettings.port": A_NUMBER_OF,
     "SonificationSettings.device": A_NUMBER_OF,

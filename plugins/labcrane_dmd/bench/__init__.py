@@ -1,1 +1,0 @@
-"""The bench: arms driven signal by signal, simulated or real, and measured."""
