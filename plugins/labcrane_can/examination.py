@@ -7,7 +7,7 @@ from labcrane import DeviceError, ProtocolError
 from labcrane.core import Finding, Verdict
 from labcrane.registry import Prompt
 from labcrane_can.command_state import PanelCommands
-from labcrane_can.listener import open_bus
+from labcrane_can.listener import MOST_FRAMES_S, open_bus
 from labcrane_can.settings import CanSettings
 
 LISTEN_S = 1.0
@@ -40,7 +40,7 @@ def _traffic(settings: CanSettings, sources: Counter[int], seconds: float) -> Fi
     rate = sum(sources.values()) / seconds
     nodes = ", ".join(f"0x{node:02X}" for node in sorted(sources))
     text = f"{settings.bus}: {rate:.0f} frames a second"
-    if rate > settings.most_frames_s:
+    if rate > MOST_FRAMES_S:
         return Finding(Verdict.FAIL, f"{text} from {nodes}", "find the device that floods the bus")
     if not sources:
         fix = f"switch the panel on; check its plug, the terminators and bitrate {settings.bitrate}"

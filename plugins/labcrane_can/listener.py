@@ -23,6 +23,9 @@ DIAL_AFTER_S, DIAL_S = 1.0, 0.5
 MOST_GARBLED = 20
 """Number of consecutive lines that are not frames, after which the bus is opened again."""
 
+MOST_FRAMES_S = 4000
+"""Frames per second above which the bus counts as flooded: about twice what 250 kbit/s carry."""
+
 AGAIN_S = 0.2
 """Time between attempts to open a bus that was lost."""
 
@@ -121,11 +124,10 @@ class Listener:
             return
         rate = self._count / (now - self._second) if self._second else 0.0
         self._second, self._count = now, 0
-        most = self._settings.most_frames_s
-        if rate > most:
+        if rate > MOST_FRAMES_S:
             self.lost = (
                 f"{self._settings.bus} is flooded: {rate:.0f} frames a second, where "
-                f"{most} are the most; find out who sends them"
+                f"{MOST_FRAMES_S} are the most; find out who sends them"
             )
             self._flooded = True
         elif self._flooded:

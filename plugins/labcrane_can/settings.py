@@ -174,10 +174,6 @@ class CanSettings(ValveMap):
     own_node: Node = 0x80
     """Source address of the messages that labcrane sends; a valve's is 0x80 plus its number."""
 
-    most_frames_s: PositiveInt = 4000
-    """Frames per second above which the bus counts as flooded: about twice the capacity of 250
-    kbit/s."""
-
     @field_validator("bus")
     @classmethod
     def _can_be_looked_for(cls, bus: str, info: ValidationInfo) -> str:

@@ -3,17 +3,9 @@
 from collections.abc import Sequence
 
 from labcrane import InputDevice, Machine, Offer, hookimpl, offer
-from labcrane.registry import CommandOffer
 from labcrane_operator.settings import OperatorSettings, RecordedSettings
 
 labcrane_api = 1
-
-
-@hookimpl
-def labcrane_commands() -> list[CommandOffer]:
-    from labcrane_operator import commands
-
-    return [CommandOffer(("operator", "fit"), commands.fit)]
 
 
 @hookimpl

@@ -8,6 +8,17 @@ from labcrane_operator.settings import OperatorSettings
 
 STILL = (0.0, 0.0, 0.0)
 
+STILL_M_S = 0.015
+"""Tip speed that the operator treats as rest, and the smallest commanded speed: below what a crane
+study counts as rest."""
+
+PATIENCE_M = 0.6
+"""Distance of the tip behind the plan at which the plan waits for the machine, in metres; it slows
+down from half of it."""
+
+PRESS_S = 0.1
+"""How long a button is pressed at rest inside the target: several ticks of any loop."""
+
 
 class Aimer:
     """One trial's aimed movements.
@@ -43,9 +54,9 @@ class Aimer:
         self._target: Point | None = None
         self.own = [0.0] * (law.DRAWN + 3 * law.BLOCK)
         self.own[law.DOING] = law.WAITING
-        still, share = settings.still_m_s, math.exp(-dt / settings.motor_noise_s)
+        still, share = STILL_M_S, math.exp(-dt / settings.motor_noise_s)
         self.own[law.DT : law.LEFT_ON] = (
-            dt, settings.gain_per_s, still, still**2, settings.motor_noise, settings.patience_m,
+            dt, settings.gain_per_s, still, still**2, settings.motor_noise, PATIENCE_M,
             settings.look_s, settings.inside, share, math.sqrt(1.0 - share * share),
         )  # fmt: skip
 
@@ -93,7 +104,7 @@ class Aimer:
         own[law.WAIT] = self._noise.reaction(settings.reaction_s, settings.reaction_sd)
         if self._noise.lapse(settings.lapse_rate):
             own[law.WAIT] += settings.lapse_s
-        own[law.PRESS] = settings.press_s
+        own[law.PRESS] = PRESS_S
 
     def _aim(self, tip: Point, target: Point, radius: float) -> None:
         """Plan a sub-movement from where the tip is."""

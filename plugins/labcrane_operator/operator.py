@@ -13,6 +13,9 @@ from labcrane_operator.noise import Noise
 from labcrane_operator.responder import Responder
 from labcrane_operator.settings import CONNECTED, STICK, OperatorSettings
 
+RESPONSE_COST = 0.1
+"""How much longer the movements of a trial with a secondary task take, as a fraction; invented."""
+
 RUNNING = Phase.RUNNING  # Python 3.11 takes long to find it there in every tick; 3.12 does not
 
 
@@ -77,7 +80,7 @@ class SimulatedOperator(InputDevice):
         if response is not None and self._responder is not None:
             self._responder.begin_trial(trial.seed)
             if response.to.partition(".")[0] in trial.active:
-                pace *= 1.0 + response.cost
+                pace *= 1.0 + RESPONSE_COST
         self._aimer = Aimer(settings, Noise(trial.seed), pace, dt)
         self._trial = trial.number
 

@@ -43,9 +43,6 @@ class ResponseSettings(Settings):
     """How much longer the response takes, and how much more often a stimulus is not noticed, with
     the hands fully deflected, as a fraction."""
 
-    cost: NonNegativeFloat = 0.1
-    """How much longer the movements of a trial with the secondary task take, as a fraction."""
-
     press_s: PositiveFloat = 0.1
     """How long the button is pressed, in seconds."""
 
@@ -100,23 +97,12 @@ class OperatorSettings(Settings):
     gain_per_s: PositiveFloat = 1.5
     """Speed of the correction per distance from the planned path, in 1/s."""
 
-    patience_m: PositiveFloat = 0.6
-    """Distance of the tip behind the plan, in metres, at which the plan waits for the machine; the
-    plan slows down from half of this distance."""
-
     look_s: PositiveFloat = 0.25
     """Time from the end of a sub-movement until the operator has seen its outcome, in seconds."""
 
     inside: float = Field(default=0.8, gt=0.0, le=1.0)
     """Distance from the target's centre that the operator treats as inside, as a fraction of its
     radius."""
-
-    still_m_s: PositiveFloat = 0.015
-    """Tip speed that the operator treats as rest, in m/s; also the smallest commanded speed."""
-
-    press_s: PositiveFloat = 0.1
-    """How long the trigger of the right stick, or ``button``, is pressed at rest inside the target,
-    in seconds."""
 
     axes: Annotated[tuple[InputAxis, ...], Once()] = ()
     """Axes of the input that the operator replaces, if these are not two joysticks:

@@ -22,6 +22,9 @@ from labcrane_scenario.settings import PanelOperatorSettings
 NEAR = 0.6
 """Proportion of a goal's radius within which the tip is not corrected while the jaws move."""
 
+TOUCH_M_S = 0.03
+"""Largest tip speed when a thing is to be touched: slow enough not to push it over."""
+
 GENTLE = 3.0
 """Distance from a goal, in its radii, within which a thing is touched gently."""
 
@@ -109,7 +112,7 @@ class ScenarioOperator(InputDevice):
         if touch == 0.0 or (touch < 0.0 and distance > NEAR * radius):
             settings = self._settings
             gently = touch == 0.0 and distance < GENTLE * radius
-            fastest = settings.touch_m_s if gently else settings.speed_m_s
+            fastest = TOUCH_M_S if gently else settings.speed_m_s
             speed = fresh * min(settings.gain_per_s * distance, fastest)
             asked = away / distance * speed
             if lapses is not None and (sinking := lapses.sinks()):

@@ -100,9 +100,6 @@ class PanelOperatorSettings(Settings):
     speed_m_s: PositiveFloat = 0.25
     """Largest commanded tip speed, in m/s."""
 
-    touch_m_s: PositiveFloat = 0.03
-    """Largest tip speed when a thing is to be touched, in m/s."""
-
     reaction_s: NonNegativeFloat = 0.4
     """Time from a new goal to the first movement, in seconds."""
 

@@ -68,8 +68,8 @@ def everything(folder: Path) -> Lab:
         of_three.to_csv(to / "movements.csv", index=False)
     for name in PEOPLE:
         recording = data / name / f"{name}.h5"
-        # Too short a session for labcrane operator fit, which writes in this way.
-        with written_about(recording, "operator fit", elsewhere / f"fitted {name}.yaml") as path:
+        # As a command of a plugin writes.
+        with written_about(recording, "a fit", elsewhere / f"fitted {name}.yaml") as path:
             path.write_text(
                 f"# Fitted to session 1 of {name}.h5\noperator: {{}}\n", encoding="utf-8"
             )

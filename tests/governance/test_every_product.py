@@ -201,7 +201,7 @@ def test_where_lists_every_file_that_holds_a_person(
     assert each.state == "erasure record: was erased"
 
 
-BY_OTHER_MEANS = {"score", "operator fit", "power"}
+BY_OTHER_MEANS = {"score", "power"}
 """They need more than one short session: what they write with is called by itself."""
 
 IN_THE_DATA_FOLDER = {

@@ -201,8 +201,9 @@ def test_another_node_or_priority_is_foreign_when_the_protocol_names_them() -> N
     assert commands.signals(0.0)[0][0] == 120.0
 
 
-def test_a_flooded_bus_holds_the_machine_and_says_so() -> None:
-    settings = CanSettings(bus="virtual:flood", valves=VALVES, most_frames_s=300)
+def test_a_flooded_bus_holds_the_machine_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("labcrane_can.listener.MOST_FRAMES_S", 300)
+    settings = CanSettings(bus="virtual:flood", valves=VALVES)
     device = CanPanel(settings, ch8())
     run = make_run(ch8(), axes=device.signals)
     with can.Bus(interface="virtual", channel="flood") as bus:
