@@ -142,23 +142,6 @@ def test_a_fault_drawn_at_random_is_told_in_its_line_with_its_remedy(
         judge(wrong, path, registry, stands)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("study", STUDIES)
-def test_a_hundred_faults_of_each_protocol_are_told_or_run(
-    study: str, folder: Path, registry: Registry, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(rehearsal, "PATIENCE_S", 0.2)
-    monkeypatch.setattr(rehearsal, "PATIENCE", 0.0)
-    passed = 0
-    path = folder / study / "protocol.yaml"
-    stands = standing(study, path, registry)
-    for wrong in drawn(study, registry, 100, seed=2):
-        found = judge(wrong, path, registry, stands)
-        if found is not None and passed < 5:
-            passed += 1
-            rehearsal.rehearse(found)
-
-
 SHARDS = 8
 
 
