@@ -22,6 +22,9 @@ PASSING = 20
 STRETCH = 10
 """Rates are compared over so many blocks."""
 
+SURE = 3.0
+"""Levels differ by as many standard deviations by chance."""
+
 QUARTZ = 5e-6
 """No quartz changes its rate by more while it warms up."""
 
@@ -73,7 +76,8 @@ def find(time: FloatArray, index: FloatArray, period: float) -> Wander:
     if float(np.ptp(lasting - walked)) > MOST_S:
         walked = lasting
     level, lasting = level - walked, lasting - walked
-    open_s = np.maximum(lasting.max() - level, level - lasting.min())
+    by_chance = SURE * 1.4826 * float(np.median(passing))
+    open_s = np.maximum(np.maximum(lasting.max() - level, level - lasting.min()) - by_chance, 0.0)
     around = sliding_window_view(np.pad(open_s, 1, mode="edge"), 3).max(axis=1)
     sizes = np.diff(np.r_[np.arange(count) * size, len(time)])
     return Wander(np.repeat(around, sizes), np.repeat(passing, sizes))
