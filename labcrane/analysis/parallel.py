@@ -1,17 +1,20 @@
-"""Parallel work: in this process, or on the cores of this computer."""
+"""Parallel work: in this process, on the cores of this computer, or on a cluster."""
 
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
-from labcrane.errors import LabcraneError
+from labcrane.errors import LabcraneError, PluginError, ProtocolError
 
 OrderT = TypeVar("OrderT")
 ResultT = TypeVar("ResultT")
 
 RETRIES = 3
 """Number of retries of work whose worker died."""
+
+CONNECT_S = 10.0
+"""Longest time to wait for a scheduler to answer, in seconds."""
 
 SHARE = 4
 """Minimum number of jobs per worker: with fewer, loading libraries takes longer than the work."""
@@ -27,6 +30,7 @@ def work(
     do: Callable[[OrderT], ResultT],
     orders: Sequence[OrderT],
     workers: int | None = 1,
+    scheduler: str | None = None,
 ) -> Iterator[ResultT]:
     """Yield the result of each job, in the order in which they finish.
 
@@ -38,12 +42,16 @@ def work(
         A function of a module; it and the jobs are sent to other processes.
     workers
         Processes on this computer; 1 is this one, None the useful number.
+    scheduler
+        Address of a Dask scheduler, ``tcp://host:8786``, whose workers do it instead.
 
     Raises
     ------
     LabcraneError
         An error of a worker; or the workers died repeatedly.
     """
+    if scheduler is not None:
+        return _on_cluster(do, orders, scheduler)
     workers = usual_workers(len(orders)) if workers is None else workers
     if workers > 1:
         return _on_cores(do, orders, workers)
@@ -90,3 +98,34 @@ def _on_cores(
 def _be_ended_by_the_parent() -> None:
     """Leave the interrupt that a terminal sends to all processes to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _on_cluster(
+    do: Callable[[OrderT], ResultT], orders: Sequence[OrderT], scheduler: str
+) -> Iterator[ResultT]:
+    try:
+        from distributed import Client, as_completed
+        from distributed.scheduler import KilledWorker
+    except ModuleNotFoundError as error:
+        raise PluginError(
+            "--scheduler needs Dask, which is not installed; install labcrane[cluster]"
+        ) from error
+    try:
+        client = Client(scheduler, timeout=CONNECT_S)
+    except (OSError, ValueError) as error:
+        raise ProtocolError(
+            f"no Dask scheduler answers at {scheduler!r}: {error}; start one with dask scheduler, "
+            "and give the address that it prints"
+        ) from error
+    with client:
+        # A worker that dies takes no result with it: the scheduler gives its work to another.
+        futures = client.map(do, orders, pure=False, retries=0)
+        try:
+            for _, result in as_completed(futures, with_results=True):
+                yield result
+        except KilledWorker as error:
+            raise LabcraneError(
+                f"workers of {scheduler} died again and again: {error}; check their logs"
+            ) from error
+        finally:
+            client.cancel(futures)

@@ -349,6 +349,7 @@ def power_of_report(
     seed: int,
     claim: Claim = DIFFERENCE,
     workers: int | None = 1,
+    scheduler: str | None = None,
 ) -> Iterator[Power]:
     """Yield the power of the test for each size of the cohort.
 
@@ -361,7 +362,7 @@ def power_of_report(
         chunks = [
             (size, seed, first, min(first + CHUNK, cohorts)) for first in range(0, cohorts, CHUNK)
         ]
-        made = dict(work(partial(_chunk, planned, by), chunks, workers))
+        made = dict(work(partial(_chunk, planned, by), chunks, workers, scheduler))
         tried = [each for first in sorted(made) for each in made[first]]
         found, null = [one.found for one in tried], [one.null for one in tried]
         if claim.margin:

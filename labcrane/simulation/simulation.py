@@ -232,7 +232,7 @@ def _keep(done: Path, path: Path) -> None:
 
 
 def simulate_study(
-    orders: Sequence[SimulationJob], workers: int | None = 1
+    orders: Sequence[SimulationJob], workers: int | None = 1, scheduler: str | None = None
 ) -> Iterator[DataFolder]:
     """Simulate the participants who are not there yet; yield each folder when it is finished.
 
@@ -246,18 +246,18 @@ def simulate_study(
     with _ready(orders) as jobs:
         missing = [order for order in jobs if not order.folder.path.exists()]
         yield from (order.folder for order in jobs if order not in missing)
-        yield from work(simulate, missing, workers)
+        yield from work(simulate, missing, workers, scheduler)
 
 
 def simulate_tables(
-    orders: Sequence[SimulationJob], workers: int | None = 1
+    orders: Sequence[SimulationJob], workers: int | None = 1, scheduler: str | None = None
 ) -> "Iterator[pd.DataFrame]":
     """Simulate the participants and yield their trial tables, in the order in which they are done.
 
     As :func:`simulate_study`, by :func:`simulate_trials`.
     """
     with _ready(orders) as jobs:
-        yield from work(simulate_trials, jobs, workers)
+        yield from work(simulate_trials, jobs, workers, scheduler)
 
 
 @contextmanager

@@ -1,11 +1,15 @@
 """Whole studies without people: the same files whoever makes them, and however often."""
 
 import hashlib
+import json
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -13,7 +17,7 @@ from dying_work import die_once
 from simple_crane import CRANE
 
 from labcrane.cli.app import main
-from labcrane.errors import ProtocolError, RecordingError
+from labcrane.errors import LabcraneError, ProtocolError, RecordingError
 from labcrane.recording.participant_file.reader import open_recording
 from labcrane.simulation.simulation import SimulationJob, simulate, simulate_study
 
@@ -228,6 +232,61 @@ def test_work_of_a_core_that_was_lost_is_done_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    from labcrane.analysis.parallel import work
+
+    monkeypatch.setattr("labcrane.analysis.parallel.CONNECT_S", 1.0)
+    with pytest.raises(LabcraneError, match=r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:1'"):
+        list(work(die_once, [(Path(), 0)], scheduler="tcp://127.0.0.1:1"))
+
+
+@contextmanager
+def cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """Start a Dask scheduler and two workers as processes; yield address and workers."""
+    file = folder / "scheduler.json"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    where = ["--host", "127.0.0.1", "--no-dashboard"]
+    running = []
+
+    def start(kind: str, *more: str) -> subprocess.Popen[bytes]:
+        words = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *where, *more]
+        running.append(subprocess.Popen(words, cwd=folder, **quiet))
+        return running[-1]
+
+    try:
+        start("scheduler", "--port", "0", "--scheduler-file", str(file))
+        deadline = time.monotonic() + 240.0
+        while not file.exists() or not file.read_text():
+            assert time.monotonic() < deadline, "the scheduler does not start"
+            time.sleep(0.05)
+        address = json.loads(file.read_text())["address"]
+        options = ("--nthreads", "1", "--nworkers", "1", "--no-nanny", "--local-directory")
+        workers = [start("worker", address, *options, str(folder / str(n))) for n in (1, 2)]
+        yield address, workers
+    finally:
+        for process in running:
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.long
+def test_a_cluster_makes_the_same_bits_even_when_a_worker_is_killed(
+    study: Path, cohort: Path, tmp_path: Path, local: dict[str, str]
+) -> None:
+    data = tmp_path / "data"
+    with cluster(tmp_path) as (address, workers):
+        making = simulate_study(orders(study, cohort, data), scheduler=address)
+        next(making)
+        while len(list((data / ".unfinished").iterdir())) < len(workers):
+            time.sleep(0.005)
+        workers[0].kill()  # in the middle of a participant, as the other one is
+        done = list(making)
+        assert workers[0].wait(240) == -signal.SIGKILL
+    assert len(done) == len(NAMES) - 1
+    assert digests(data) == local
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [pytest.param(["report"], marks=pytest.mark.long), ["export", "--to", "tables"]],
@@ -248,3 +307,68 @@ def test_two_cores_report_and_export_the_same(
     assert one == two
     assert len(one) > 2
     assert set(digests(tmp_path / "1")) == set(digests(tmp_path / "2"))
+
+
+@contextmanager
+def killed_at_work(
+    address: str, workers: "Sequence[subprocess.Popen[bytes]]"
+) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Kill the first worker that has something to do; say which that was."""
+    from distributed import Client
+
+    killed: list[subprocess.Popen[bytes]] = []
+    ready, over = threading.Event(), threading.Event()
+
+    def watch() -> None:
+        with Client(address, set_as_default=False) as client:
+            client.wait_for_workers(len(workers))
+            whose = {pid: where for where, pid in client.run(os.getpid).items()}
+            ready.set()
+            while not over.is_set():
+                busy = client.processing()
+                for worker in workers:
+                    if busy.get(whose[worker.pid]):
+                        killed.append(worker)
+                        worker.kill()
+                        return
+
+    watching = threading.Thread(target=watch)
+    watching.start()
+    try:
+        assert ready.wait(240)
+        yield killed
+    finally:
+        over.set()
+        watching.join()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("command", ["power", "report", "export"])
+def test_a_cluster_does_what_one_process_does_even_when_a_worker_is_killed(
+    study: Path, cohort: Path, tmp_path: Path, command: str
+) -> None:
+    """Real processes: the worker dies while it has work, and its work is done by the other one."""
+    data = tmp_path / "data"
+    if command != "power":
+        list(simulate_study(orders(study, cohort, data)))
+    words = {
+        "power": ["power", str(study), "--participants", "4", "--pool", "6", "--cohorts", "60",
+                  "--test", "contrast", "--effect", "movement_time~group[none,slow]=1"],
+        "report": ["report", str(data), "--include", "simulated"],
+        "export": ["export", str(data), "--include", "simulated", "--to", "tables"],
+    }[command]  # fmt: skip
+    assert main([*words, "--out", str(tmp_path / "one")]) == 0
+    for kept in data.rglob("*.parquet"):
+        kept.unlink()  # of measures: they are to be worked out again
+    with (
+        cluster(tmp_path) as (address, workers),
+        killed_at_work(address, workers) as killed,
+    ):
+        assert main([*words, "--out", str(tmp_path / "two"), "--scheduler", address]) == 0
+    assert [worker.wait(240) for worker in killed] == [-signal.SIGKILL]
+    one, two = (
+        {name: each for name, each in digests(tmp_path / where).items() if name.endswith(".csv")}
+        for where in ("one", "two")
+    )
+    assert one == two
+    assert one

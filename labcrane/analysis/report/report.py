@@ -76,6 +76,7 @@ def write_report(
     progress: Callable[[int, int], None] | None = None,
     leave_out: Callable[[str, Unusable], None] | None = None,
     workers: int = 1,
+    scheduler: str | None = None,
     unprobed: Sequence[str] = (),
     judge: Judge | None = None,
 ) -> Path:
@@ -90,7 +91,7 @@ def write_report(
     leave_out
         Called with a participant whose data cannot be used, and the reason; the report is of the
         others, and states so.
-    workers
+    workers, scheduler
         The workers; see :func:`labcrane.analysis.parallel.work`.
     unprobed
         Streams whose clock offset was never measured but which are used, in words.
@@ -101,7 +102,7 @@ def write_report(
     (folder / "participants").mkdir(exist_ok=True)
     one = partial(_one, settings=settings, folder=folder.resolve())
     found: dict[str, PersonTables] = {}
-    for name, made in work(one, cohort.included, workers):
+    for name, made in work(one, cohort.included, workers, scheduler):
         if isinstance(made, PersonTables):
             found[name] = made
         else:

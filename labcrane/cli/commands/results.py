@@ -29,6 +29,7 @@ WorkersOrCores = Annotated[
         min=1,
     ),
 ]
+Scheduler = Annotated[str | None, typer.Option(help="address of a Dask scheduler: tcp://host:8786")]
 AcceptUnprobed = Annotated[
     bool,
     typer.Option(
@@ -52,6 +53,7 @@ def export(
         list[str] | None, typer.Option("--set", help="NAME=VALUE of the exporter; may be repeated")
     ] = None,
     workers: WorkersOrCores = None,
+    scheduler: Scheduler = None,
     accept_unprobed: AcceptUnprobed = False,
 ) -> None:
     """Export recordings for R, MATLAB, BIDS, Psych-DS or EEG programs."""
@@ -70,13 +72,13 @@ def export(
     place = call_monitor.place(f"exporter {to!r}", plugin, "export", offer.build)
     chosen = _settings(offer.settings, settings or [], to)
     check_empty(folder)  # before anything is measured
-    cohort = cohort_of(data, include)
+    cohort = cohort_of(data.resolve() if scheduler else data, include)
     unknown = check_probed(cohort.included, accept=accept_unprobed)
     _, first = next(cohort.included[0].sessions())
     exporter = call_monitor.call(place, offer.build, chosen, machine_of(first))
 
     def attempt(cohort: "Cohort") -> None:
-        people = _Read(_measured(cohort, workers))
+        people = _Read(_measured(cohort, workers, scheduler))
         with (
             _product(data, to, folder, cohort, shared=exporter.shared, empty=True) as made,
             progress_bar(f"export to {to}", len(cohort.included)) as advance,
@@ -149,19 +151,21 @@ def _tell_left_out(cohort: "Cohort") -> None:
     raise typer.Exit(LEFT_OUT)
 
 
-def _measured(cohort: "Cohort", workers: int | None) -> "Sequence[Participant]":
+def _measured(
+    cohort: "Cohort", workers: int | None, scheduler: str | None
+) -> "Sequence[Participant]":
     """Return the participants; several workers compute their measures first."""
     from labcrane.analysis.parallel import usual_workers, work
 
     workers = workers or usual_workers(len(cohort.included))
-    if workers == 1:
+    if workers == 1 and scheduler is None:
         return cohort.included
     from labcrane.analysis.measures import measure_or_say_why
     from labcrane.analysis.unusable import Unusable
 
     with progress_bar("measure", len(cohort.included)) as advance:
         done = {}
-        for name, person in work(measure_or_say_why, cohort.included, workers):
+        for name, person in work(measure_or_say_why, cohort.included, workers, scheduler):
             if isinstance(person, Unusable):
                 raise _UnusableError(name, person)
             done[name] = person
@@ -176,6 +180,7 @@ def report(
     ),
     include: Include = None,
     workers: WorkersOrCores = None,
+    scheduler: Scheduler = None,
     accept_unprobed: AcceptUnprobed = False,
 ) -> None:
     """Write an HTML report of a study: figures, measures, statistics, quality."""
@@ -184,7 +189,7 @@ def report(
     from labcrane.analysis.report.report import write_report
     from labcrane.simulation.track_cohort import judged
 
-    cohort = cohort_of(data, include)
+    cohort = cohort_of(data.resolve() if scheduler else data, include)
     unknown = check_probed(cohort.included, accept=accept_unprobed)
 
     def leave_out(name: str, why: "Unusable") -> None:
@@ -201,6 +206,7 @@ def report(
             leave_out=leave_out,
             progress=lambda done, of: advance(),
             workers=workers or usual_workers(len(cohort.included)),
+            scheduler=scheduler,
             unprobed=unknown,
             judge=judged,
         )

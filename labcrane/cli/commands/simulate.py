@@ -9,6 +9,7 @@ import typer
 
 from labcrane.cli.commands.results import (
     Include,
+    Scheduler,
     WorkersOrCores,
     cohort_of,
     progress_bar,
@@ -43,6 +44,7 @@ def simulate(
     ] = None,
     cohort: CohortPath = None,
     workers: WorkersOrCores = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Run a whole study with simulated operators, as fast as possible.
 
@@ -55,7 +57,7 @@ def simulate(
     study = load(protocol, discover(study=protocol))
     count = participants or study.protocol.participants.planned
     names = pseudonyms(study.protocol.participants.pattern, count)
-    simulate_all(protocol, folder, names, cohort, workers)
+    simulate_all(protocol, folder, names, cohort, workers, scheduler)
     out.print(f"SIMULATED: {count} participants in {folder}", markup=False)
 
 
@@ -65,6 +67,7 @@ def simulate_all(
     names: "Sequence[str]",
     cohort: Path | None,
     workers: int | None,
+    scheduler: str | None,
 ) -> None:
     """Simulate the participants who are not in ``folder`` yet, and report progress."""
     from labcrane.simulation.simulation import simulate_study
@@ -72,7 +75,7 @@ def simulate_all(
     orders = _orders(protocol, folder, names, cohort)
     try:
         with progress_bar("simulate", len(orders)) as advance:
-            for _ in simulate_study(orders, workers):
+            for _ in simulate_study(orders, workers, scheduler):
                 advance()
     except KeyboardInterrupt:
         there = sum(order.folder.path.exists() for order in orders)
@@ -142,6 +145,7 @@ def power(
     ] = "",
     cohort: CohortPath = None,
     workers: WorkersOrCores = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Estimate the planned test's power and sample size, from simulated or recorded participants.
 
@@ -165,19 +169,21 @@ def power(
         )
     kind = _kind(test)
     if recordings is not None:
-        everyone = _recorded(recordings, include, workers)
+        everyone = _recorded(recordings, include, workers, scheduler)
     else:
         count = pool or POOL_TIMES * max(sizes)
         if resimulate is not None:
             count, cohorts = resimulate * max(sizes), resimulate
         names = pseudonyms(study.protocol.participants.pattern, count)
-        everyone = _simulated(protocol, folder / "pool", names, cohort, study, tested, workers)
+        everyone = _simulated(
+            protocol, folder / "pool", names, cohort, study, tested, workers, scheduler
+        )
     by = _Drawn(study.protocol.study, sizes, cohorts, to_show, recordings is not None, folder)
     with _written(folder, recordings, everyone.people) as to:
         movements = everyone.movements
         if kind is not None:
             movements.to_csv(to / "movements.csv", index=False)
-            _power_of_report(to, everyone, tested, effect, kind, goals, by, workers)
+            _power_of_report(to, everyone, tested, effect, kind, goals, by, workers, scheduler)
             return
         movements[is_result(movements)].to_csv(to / "movements.csv", index=False)
         _print_power(to, by, everyone, tested, fresh=resimulate is not None)
@@ -243,6 +249,7 @@ def _simulated(
     study: "Study",
     effect: "Effect",
     workers: int | None,
+    scheduler: str | None,
 ) -> _Everyone:
     """Return a simulated pool; files are made only where frames are asked for."""
     from labcrane.analysis.measures import OF_TRIALS
@@ -259,22 +266,24 @@ def _simulated(
     }
     there = {each.name for each in codebook(study) if each.table == "trials"} | {*OF_TRIALS}
     if effect.measure not in there:
-        simulate_all(protocol, folder, names, cohort, workers)
-        return _movements(folder, people, workers)
+        simulate_all(protocol, folder, names, cohort, workers, scheduler)
+        return _movements(folder, people, workers, scheduler)
     orders = _orders(protocol, folder, names, cohort)
     with progress_bar("simulate", len(orders)) as advance:
         tables = []
-        for table in simulate_tables(orders, workers):
+        for table in simulate_tables(orders, workers, scheduler):
             tables.append(table)
             advance()
     return _together(tables, people)
 
 
-def _recorded(folder: Path, include: "list[str] | None", workers: int | None) -> _Everyone:
+def _recorded(
+    folder: Path, include: "list[str] | None", workers: int | None, scheduler: str | None
+) -> _Everyone:
     """Return the included participants of a data folder."""
-    cohort = cohort_of(folder, include)
+    cohort = cohort_of(folder.resolve() if scheduler else folder, include)
     people = {each.name: str(each.context.get("group", "")) for each in cohort.included}
-    return _measured(cohort.included, people, workers)
+    return _measured(cohort.included, people, workers, scheduler)
 
 
 def _power_of_report(
@@ -286,6 +295,7 @@ def _power_of_report(
     goals: "Sequence[float]",
     by: _Drawn,
     workers: int | None,
+    scheduler: str | None,
 ) -> None:
     from labcrane.design.seeds import derive
     from labcrane.files.atomic import write_text
@@ -297,7 +307,7 @@ def _power_of_report(
     seed = derive(by.study, "power")
 
     def power_at(size: int) -> Power:
-        (one,) = power_of_report(planned, [size], by.cohorts, seed, by.claim, workers)
+        (one,) = power_of_report(planned, [size], by.cohorts, seed, by.claim, workers, scheduler)
         return one
 
     with progress_bar("test", len(by.sizes)) as advance:
@@ -378,26 +388,29 @@ def _sizes(text: str) -> list[int]:
     return sizes
 
 
-def _movements(folder: Path, people: "Mapping[str, str]", workers: int | None) -> _Everyone:
+def _movements(
+    folder: Path, people: "Mapping[str, str]", workers: int | None, scheduler: str | None
+) -> _Everyone:
     """Return the participants of a pool, who may be more in its folder."""
     from labcrane.analysis.cohort import find_cohort
 
     there = find_cohort(folder.resolve(), ["simulated", "half-finished"]).included
     wanted = [person for person in there if person.name in people]
-    return _measured(wanted, people, workers)
+    return _measured(wanted, people, workers, scheduler)
 
 
 def _measured(
     there: "Sequence[Participant]",
     people: "Mapping[str, str]",
     workers: int | None,
+    scheduler: str | None,
 ) -> _Everyone:
     from labcrane.analysis.measures import measures_of
     from labcrane.analysis.parallel import work
 
     with progress_bar("measure", len(there)) as advance:
         tables = []
-        for table in work(measures_of, there, workers):
+        for table in work(measures_of, there, workers, scheduler):
             tables.append(table)
             advance()
     return _together(tables, people)
