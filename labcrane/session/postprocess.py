@@ -163,7 +163,7 @@ def _filmed_back(
     def signal() -> tuple[FloatArray, FloatArray]:
         return session.films[film].level(settings["sees_part"])
 
-    found = _looped((name, LEVEL, of), session, signal, stated_s)
+    found = _looped((name, LEVEL, of), session, signal, stated_s, upright=True)
     declared = settings.get("lag_s")
     return [replace(found, declared_s=math.nan if declared is None else declared)]
 
@@ -173,10 +173,12 @@ def _looped(
     session: SessionRecord,
     signal: Callable[[], tuple[FloatArray, FloatArray]],
     stated_s: float,
+    *,
+    upright: bool = False,
 ) -> LoopBack:
     try:
         changes, light = _changes(session, names[2])
-        return judge_loop_back(names, changes, signal(), stated_s, light=light)
+        return judge_loop_back(names, changes, signal(), stated_s, light=light, upright=upright)
     # A sensor must not keep a session from its file, whatever it or its stream is.
     except Exception as error:  # noqa: BLE001
         told = error if isinstance(error, LabcraneError) else f"{error!r}; please report this"

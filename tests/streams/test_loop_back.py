@@ -118,3 +118,18 @@ def test_sounds_are_heard_where_they_begin():
 
 def changes(shown):
     return [Change(float(at), up=k % 2 == 0) for k, at in enumerate(shown)]
+
+
+@pytest.mark.parametrize("late", [0.3, 0.6, 0.7, 1.2])
+@pytest.mark.parametrize("least", [0.3, 0.5, 0.9])
+def test_a_delay_longer_than_between_changes_is_never_stated_wrongly(late, least):
+    """A film 700 ms late was measured as 182 ms late, and passed."""
+    random = np.random.default_rng([8, int(10 * late), int(10 * least)])
+    shown = 1000.0 + np.cumsum(random.uniform(least, 1.4 * least, 60))
+    times = np.arange(shown[0] - 5.0, shown[-1] + 5.0, 1.0 / 30.0)
+    bright = np.searchsorted(shown + late, times) % 2
+    changes = [Change(at, k % 2 == 0) for k, at in enumerate(shown)]
+    names = ("film", "brightness", "view")
+    found = judge_loop_back(names, changes, (times, bright + 0.0), 0.002, light=True, upright=True)
+    if found.verdict is Verdict.PASS:
+        assert found.delay.mean_s == pytest.approx(late, abs=0.02)

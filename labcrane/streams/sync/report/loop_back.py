@@ -18,6 +18,9 @@ from labcrane.types import FloatArray
 BEFORE_S, AFTER_S = 0.15, 0.45
 """What is looked at about a change: longer than screens and sound devices are late."""
 
+SCATTERS_S = 0.03
+"""Screens and sound devices are late by amounts that differ by less, a standard deviation."""
+
 PARTS = 3
 """The first third of the session is compared with the last."""
 
@@ -92,6 +95,7 @@ def judge_loop_back(
     stated_s: float,
     *,
     light: bool,
+    upright: bool = False,
 ) -> LoopBack:
     """Compare a channel with the changes that it was to see or hear.
 
@@ -110,6 +114,8 @@ def judge_loop_back(
         Uncertainty of the times at 95 %.
     light
         Whether it is a photodiode; otherwise it hears or feels.
+    upright
+        Whether light makes the signal rise, as in a film; amplifiers have either sign.
     """
     times, values = signal
     changes = [one for one in changes if len(times) and times[0] <= one.time <= times[-1]]
@@ -124,12 +130,18 @@ def judge_loop_back(
     # An edge may be as early as times may be off, and by a sample.
     early_s = EARLY_S + float(np.nan_to_num(stated_s)) + float(np.nan_to_num(1.0 / sensor_hz))
     late = np.array(
-        [_late(one, after, times, values, early_s, light=light) for one, after in _spans(changes)]
+        [
+            _late(one, after, times, values, early_s, light=light, upright=upright)
+            for one, after in _spans(changes)
+        ]
     )
     try:
         found = in_short(late, sensor_hz)
     except DeviceError as error:
-        return LoopBack(*names, stated_s, Verdict.FAIL, findings=(Finding.failed(error),))
+        failed = Finding.failed(
+            DeviceError(f"{error}; longer delays than {AFTER_S:g} s are not seen")
+        )
+        return LoopBack(*names, stated_s, Verdict.FAIL, findings=(failed,))
     at = np.flatnonzero(np.isfinite(late))
     first, last = late[at[: len(at) // PARTS]], late[at[len(at) - len(at) // PARTS :]]
     moved = noise = float("nan")
@@ -149,6 +161,15 @@ def judge_loop_back(
                     "samples are stamped",
                 )
             )
+    if found.sd_s > SCATTERS_S + 2.0 * stated_s + 1.0 / sensor_hz:
+        findings.append(
+            Finding(
+                Verdict.FAIL,
+                f"the delays from {names[2]} to {names[1]} scatter by {1e3 * found.sd_s:.0f} ms: "
+                "some may be of the change before",
+                f"let {names[2]} change once a second at most, and measure again",
+            )
+        )
     early = float(np.quantile(late[at], 0.05))
     if early < -(stated_s + 1.0 / sensor_hz):
         findings.append(
@@ -175,11 +196,9 @@ def _late(
     early_s: float,
     *,
     light: bool,
+    upright: bool,
 ) -> float:
-    """Return how long after a change the first edge is near it; NaN without one.
-
-    Whether the signal rises or falls is not asked: amplifiers have either sign.
-    """
+    """Return how long after a change the first edge is near it; NaN without one."""
     first, end = np.searchsorted(
         times, (change.time - BEFORE_S, min(change.time + AFTER_S, after - EARLY_S))
     )
@@ -190,5 +209,9 @@ def _late(
         edges = steps(near, level) if light else onsets(near, level)
     except DeviceError:
         return float("nan")
-    late = (edge.time - change.time for edge in edges if edge.time >= change.time - early_s)
+    late = (
+        edge.time - change.time
+        for edge in edges
+        if edge.time >= change.time - early_s and (edge.up == change.up or not (upright and light))
+    )
     return next(late, float("nan"))
