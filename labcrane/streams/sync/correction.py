@@ -317,7 +317,9 @@ def _evened(
         if not declared:  # a mean that is known holds for the middle of a chunk
             error[part] += sampling.chunk_s
         if not treatment.can_drop_samples:  # nothing else tells uneven samples from late stamps
-            error[part] += NEARLY_ALL * sampling.uneven_s + sampling.slip_s + sampling.wander_s
+            error[part] += NEARLY_ALL * sampling.uneven_s + sampling.slip_s
+        if raw.index is not None or not treatment.can_drop_samples:
+            error[part] += sampling.wander_s
         if sampling.shifted is not None:
             error[part] += sampling.shifted.open_s(segment.stop - segment.start)
         if way is Dejitter.AUTO and followed is not None and segment.basis is Basis.PROBES:

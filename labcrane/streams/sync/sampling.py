@@ -255,16 +255,14 @@ def examine(
                 shift_s=receipt.open_shift(flowed, index),
                 breaks=found.breaks[: 0 if counter is None else None],
                 chunk_s=found.chunk_s,
-                wander_s=found.moves(
-                    stamps, waited.period, index if lost is None else index - lost.open
-                ).open_s,
+                wander_s=found.moves(stamps, waited.period, index).open_s,
             )
     noise, late, by_grid, uneven = _noise(time, arrival, found, grid)
     rates = _rates(found)
     steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
     moves = None
     if probed and not disordered:
-        moves = found.moves(stamps, found.period, found.told)
+        moves = found.moves(stamps, found.period, found.index)
     unplaced = late and counter is None and (found.clumped or found.missing > 0)
     return Sampling(
         found.period,
@@ -347,7 +345,6 @@ class _Steps:
     time: FloatArray
     flowed: FloatArray
     unpaused: FloatArray
-    told: FloatArray
     breaks: npt.NDArray[np.intp]
     period: float
     local: FloatArray
@@ -388,9 +385,8 @@ def _steps(
     rest = steps - whole * local
     scatter = 1.4826 * float(np.median(np.abs(rest)))
     odd = float((np.abs(rest) > WHOLE * local).mean())
-    # Where many steps are of two periods, the period is that of polls, and not the sampler's.
-    odd = max(odd, float((whole > counts).mean()) - FEW_LOST)
     exact = scatter < EXACT * float(np.median(local)) and odd < 0.01  # noqa: PLR2004
+    exact = exact and not _are_polls(whole > counts)
     same, in_chunks = _chunks(steps, counts * local)
     # Steps are computed by one rate, whatever the clock that stamps the chunks does meanwhile.
     one_rate = bool(np.ptp(np.quantile(local, (0.1, 0.9))) < RATE_CHANGE * typical)
@@ -413,8 +409,10 @@ def _steps(
     missing = int((whole - 1.0).sum())
     position = index if counted else index[0] + np.r_[0.0, np.cumsum(whole)]
     flowed = time - np.r_[0.0, np.cumsum(beyond - back)]
-    unpaused, told = _known(hole, shifted, counts, local, exact=exact, pauses=pauses)
-    unpaused, told = time - unpaused, index[0] + told
+    moved = np.zeros(len(steps))
+    moved[shifted.at - 1] = shifted.by_s
+    long = (beyond + (whole - counts) * local >= wander.MOST_S) | pauses
+    unpaused = time - np.r_[0.0, np.cumsum(np.where(long & (moved == 0.0), beyond, moved))]
     mean, usual = slope(position, flowed), float(np.median(local))
     if computed and not clumped and not counted:
         first = np.r_[0, np.flatnonzero(~same) + 1]
@@ -428,7 +426,7 @@ def _steps(
     # A long hole may be off by a part of a period, and what is behind it seem to stray.
     even = exact and not grid and not len(breaks) and float(whole.max()) < levels.LONG_HOLE
     return _Steps(
-        time, flowed, unpaused, told, breaks + 1, mean, local, position, missing, int(gaps.sum()),
+        time, flowed, unpaused, breaks + 1, mean, local, position, missing, int(gaps.sum()),
         longest, exact, computed, clumped, shifted,
         max(STRAY_S, 8.0 * scatter) if even else np.inf,
         exact and not counted and hole.may_be_slips(len(steps)),
@@ -436,26 +434,12 @@ def _steps(
     )  # fmt: skip
 
 
-def _known(
-    hole: holes.Holes,
-    shifted: shifts.Shifts,
-    counts: FloatArray,
-    usual: FloatArray,
-    *,
-    exact: bool,
-    pauses: bool,
-) -> tuple[FloatArray, FloatArray]:
-    """Return the time in pauses and shifts before each sample, and its count, both from 0.
-
-    What holes of stamps that scatter are nothing tells, unless they are of one sample, longer than
-    a buffer, or declared.
-    """
-    lost, beyond, moved = hole.lost(len(counts)), hole.beyond(len(counts)), np.zeros(len(counts))
-    moved[shifted.at - 1] = shifted.by_s
-    long = (beyond + lost * usual >= wander.MOST_S) | pauses
-    told = counts + np.where(exact | (lost <= 1.0) | long, lost, 0.0)
-    unmoved = np.where(long & (moved == 0.0), beyond, moved)
-    return np.r_[0.0, np.cumsum(unmoved)], np.r_[0.0, np.cumsum(told)]
+def _are_polls(longer: npt.NDArray[np.bool_]) -> bool:
+    """Return whether longer steps come at even intervals: those are of polls that found nothing."""
+    apart = np.diff(np.flatnonzero(longer))
+    if len(apart) < FEW_LOST * len(longer):
+        return False
+    return bool(np.ptp(np.quantile(apart, (0.02, 0.98))) <= 1.0)
 
 
 def _chunks(steps: FloatArray, usual: FloatArray) -> tuple[npt.NDArray[np.bool_], bool]:

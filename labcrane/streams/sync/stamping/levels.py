@@ -44,14 +44,10 @@ class Levels:
         Samples that were lost before each one, shape ``(n,)``.
     unsure
         How many of them may have been lost before it or behind it, shape ``(n,)``.
-    open
-        How many of them were lost several at once, shape ``(n,)``: by as much a delay may have
-        grown.
     """
 
     lost: FloatArray
     unsure: FloatArray
-    open: FloatArray
 
 
 def find(time: FloatArray, period: float, index: FloatArray | None = None) -> Levels | None:
@@ -102,8 +98,7 @@ def of_packets(time: FloatArray, period: float) -> Levels | None:
     found = find(time[starts], size * period, starts / size)
     if found is None:
         return None
-    each = (found.lost, found.unsure, found.open)
-    return Levels(*(size * np.repeat(one, counts) for one in each))
+    return Levels(*(size * np.repeat(each, counts) for each in (found.lost, found.unsure)))
 
 
 def _counted(late: FloatArray, means: FloatArray, rise: FloatArray) -> Levels | None:
@@ -122,7 +117,7 @@ def _counted(late: FloatArray, means: FloatArray, rise: FloatArray) -> Levels | 
     """
     wide = len(means) - len(rise)
     variance = float(np.var(np.diff(late))) / 2.0
-    lost, unsure, several = np.zeros((3, len(late)))
+    lost, unsure = np.zeros((2, len(late)))
     odd = np.flatnonzero(np.abs(rise) > 0.5) + wide  # noqa: PLR2004
     for near in np.split(odd, np.flatnonzero(np.diff(odd) > wide) + 1):
         if not len(near):
@@ -132,10 +127,9 @@ def _counted(late: FloatArray, means: FloatArray, rise: FloatArray) -> Levels | 
         periods = float(means[last]) - before
         if abs(periods - round(periods)) > WHOLE or not 0.0 <= round(periods) < LONG_HOLE:
             return None
-        several[first:] += round(periods) * (round(periods) > 1)
         for level in range(round(periods)):
             beyond = np.cumsum(late[first:last] - before - level - 0.5)
             likely = np.flatnonzero(beyond - beyond.min() < LIKELY * variance)
             lost[first + int(np.argmin(beyond)) + 1 :] += 1.0
             unsure[first + likely[0] + 1 : first + likely[-1] + 1] += 1.0
-    return Levels(lost, unsure, several)
+    return Levels(lost, unsure)

@@ -68,7 +68,7 @@ def find(time: FloatArray, index: FloatArray, period: float) -> Wander:
     late = (time - time[0] - due)[: count * size].reshape(count, size)
     level = np.sort(late, axis=1)[:, size // 4 : size - size // 4].mean(axis=1)
     at = due[size // 2 :: size][:count]
-    far = min(STRETCH, count - 1)
+    far = min(max(STRETCH, count // 5), count - 1)
     level = level - at * _usual((level[far:] - level[:-far]) / (at[far:] - at[:-far]))
     lasting = _lasting(level)
     passing = np.abs(level - lasting)
