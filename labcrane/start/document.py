@@ -21,6 +21,12 @@ from labcrane.start.text import positions, ties
 HASH = 16
 """Hexadecimal digits of a hash in a draft's name."""
 
+DIGITS = "[0-9a-f]" * HASH
+"""The hash, as a pattern."""
+
+DEPTH = ("*", "*/*")
+"""How deep files of a study are looked for in its folder."""
+
 TEXTS = frozenset({".md", ".txt", ".yaml", ".yml"})
 """Files of a study that can be edited as text."""
 
@@ -132,8 +138,8 @@ class Document:
             raise NewerFileError(f"{self.path} was changed by another program since it was opened")
         if self.approved and not over_approved:
             raise ApprovedError(
-                f"{self.study} is approved; after a change, sessions run only once labcrane amend "
-                "has recorded it"
+                f"{self.path} belongs to an approved study; after a change, sessions run only once "
+                "labcrane amend has recorded it"
             )
         ends = "\r\n" if b"\r\n" in self._raw() else "\n"
         written = self.text.replace("\n", ends)
@@ -161,8 +167,10 @@ class Document:
 
     @property
     def approved(self) -> bool:
-        """Whether the study has a lock."""
-        return lock_path(self.study).exists()
+        """Whether the protocol has a lock; of another file, any protocol of the folder."""
+        if self.path == self.study:
+            return lock_path(self.study).exists()
+        return any(self.study.parent.glob(lock_path(Path("*")).name))
 
     def shown(self) -> dict[str, Any]:
         """Return all that a page shows of it."""
@@ -194,7 +202,7 @@ class Document:
             "protocols": [each.name for each in sorted(folder.glob("*.y*ml")) if is_protocol(each)],
             "files": sorted(
                 each.relative_to(folder).as_posix()
-                for pattern in ("*", "*/*")
+                for pattern in DEPTH
                 for each in folder.glob(pattern)
                 if each.suffix in TEXTS and not each.name.startswith(".")
             ),
@@ -234,8 +242,16 @@ def is_protocol(path: Path) -> bool:
         return False  # gone, or not for this user
 
 
+def drafted(folder: Path) -> set[Path]:
+    """Return the files of a study's folder that have a draft."""
+    found = (each for depth in DEPTH for each in folder.glob(f"{depth}.{DIGITS}.unsaved"))
+    return {
+        each.with_name(each.name[1:].rsplit(".", 2)[0]) for each in found if each.name[0] == "."
+    }
+
+
 def _drafts(path: Path) -> list[Path]:
-    return sorted(path.parent.glob(f".{glob.escape(path.name)}.{'[0-9a-f]' * HASH}.unsaved"))
+    return sorted(path.parent.glob(f".{glob.escape(path.name)}.{DIGITS}.unsaved"))
 
 
 def _hash(raw: bytes) -> str:

@@ -23,7 +23,14 @@ from labcrane.files.atomic import SHARED_FILE, write_text
 from labcrane.files.lock import held
 from labcrane.files.study_folder import YAML
 from labcrane.limits import LIMITS
-from labcrane.start.document import TEXTS, ApprovedError, Document, NewerFileError, is_protocol
+from labcrane.start.document import (
+    TEXTS,
+    ApprovedError,
+    Document,
+    NewerFileError,
+    drafted,
+    is_protocol,
+)
 from labcrane.start.jobs import Job, OfferedCommand
 from labcrane.start.recent import recent, remember
 from labcrane.start.text import edited
@@ -84,6 +91,7 @@ class Workspace:
         self._document: Document | None = None
         self._opened: dict[Path, Document] = {}
         self._held = contextlib.ExitStack()
+        self._folder: Path | None = None
         self._jobs: list[Job] = []
         self._schemas: dict[Path, Any] = {}
         self._lock = threading.RLock()
@@ -127,7 +135,14 @@ class Workspace:
             "commands": [asdict(each) for each in self._offered.values()],
             "open": self._document is not None,
             "jobs": [each.shown() for each in self._jobs],
+            "folders": self._folders(),
         }
+
+    def _folders(self) -> list[str]:
+        """Return the folders in that of the open study: a command can be given a new one."""
+        if self._document is None:
+            return []
+        return [each.name for each in self._document.study.parent.iterdir() if each.is_dir()]
 
     def open(self, path: str) -> dict[str, Any]:
         """Open a study of the folder, or one that was open before."""
@@ -137,11 +152,12 @@ class Workspace:
                 f"{wanted} is outside {self.root}; start labcrane with that study's folder"
             )
         with self._lock:
-            if self._document is None or self._document.study.parent != wanted.parent:
+            if self._folder is None or not wanted.is_relative_to(self._folder):
                 opened = Document.open(wanted)
                 lock = self._hold(wanted.parent)
                 self._held.close()
-                self._held, self._opened = lock, {wanted: opened}
+                self._held, self._folder = lock, wanted.parent
+                self._opened = {wanted: opened}
             remember(wanted)
             return self._turn_to(wanted, wanted)
 
@@ -168,17 +184,41 @@ class Workspace:
         if self._document is not None:  # a page of the file before is refused
             opened.revision = max(opened.revision, self._document.revision) + 1
         self._opened[path] = self._document = opened
-        return opened.shown()
+        return self._shown()
+
+    def _shown(self) -> dict[str, Any]:
+        """Return all that the page shows of the open file, and the other files not saved."""
+        folder = self.document.study.parent
+        others = [each.relative_to(folder).as_posix() for each in self._others()]
+        return {**self.document.shown(), "others": others}
+
+    def _others(self) -> list[Path]:
+        """Return the study's other files with a draft, also one that an earlier start has left."""
+        folder = self.document.study.parent
+        opened = {path for path, each in self._opened.items() if each.unsaved}
+        below = {path for path in opened if path.is_relative_to(folder)}
+        return sorted((drafted(folder) | below) - {self.document.path})
 
     def _hold(self, folder: Path) -> contextlib.ExitStack:
-        """Hold a study's folder against other start pages, with the address of this one in it."""
-        path, held_here = folder / OPEN, contextlib.ExitStack()
-        there = path.read_text(encoding="utf-8").splitlines()[1:] if path.is_file() else []
-        refusal = f"{folder} is open in another labcrane start, {' '.join(there) or 'elsewhere'}; "
-        held_here.enter_context(held(path, f"{refusal}go on there, or end that one"))
-        with path.open("a", encoding="utf-8") as file:
-            file.write(f"{self._address}\n")
-        return held_here
+        """Hold a study's folder against other start pages, with the address of this one in it.
+
+        Raises
+        ------
+        StorageError
+            Another start page holds it, a folder above it, or one in it.
+        """
+        with contextlib.ExitStack() as held_here:
+            path = folder / OPEN
+            held_here.enter_context(held(path, _refusal(path)))
+            near = [each / OPEN for each in folder.parents]
+            near += [found for depth in DEPTH for found in folder.glob(f"{depth}/{OPEN}")]
+            for other in near:
+                if other.is_file() and other.parent != self._folder:
+                    with held(other, _refusal(other)):
+                        pass  # left by a page that was killed
+            with path.open("a", encoding="utf-8") as file:
+                file.write(f"{self._address}\n")
+            return held_here.pop_all()
 
     def close(self) -> None:
         """Let go of the study that is open."""
@@ -196,7 +236,7 @@ class Workspace:
 
     def show(self) -> dict[str, Any]:
         """Return the open study as it stands."""
-        return self.document.shown()
+        return self._shown()
 
     def edit(
         self, revision: int, how: str, place: list[str | int], value: Any = None
@@ -205,7 +245,7 @@ class Workspace:
         with self._lock:
             document = self.document
             document.change(revision, edited(document.text, how, tuple(place), value))
-            return document.shown()
+            return self._shown()
 
     def splice(self, revision: int, begin: int, end: int, text: str) -> dict[str, Any]:
         """Put ``text`` in the place of the characters from ``begin`` to ``end``."""
@@ -215,37 +255,57 @@ class Workspace:
             if not 0 <= begin <= end <= len(before):
                 raise ProtocolError(f"the text has no characters {begin} to {end}")
             document.change(revision, before[:begin] + text + before[end:])
-            return document.shown()
+            return self._shown()
 
     def undo(self, revision: int) -> dict[str, Any]:
         """Take the last change back."""
         with self._lock:
             self.document.undo(revision)
-            return self.document.shown()
+            return self._shown()
 
     def redo(self, revision: int) -> dict[str, Any]:
         """Make it again."""
         with self._lock:
             self.document.redo(revision)
-            return self.document.shown()
+            return self._shown()
 
     def save(
-        self, revision: int, over_newer: bool = False, over_approved: bool = False  # noqa: FBT001, FBT002 - keys of a request
+        self, revision: int, over_newer: bool = False, over_approved: bool = False,  # noqa: FBT001, FBT002 - keys of a request
+        every: bool = False,  # noqa: FBT001, FBT002
     ) -> dict[str, Any]:  # fmt: skip
-        """Write the study's file, or return the question that must be answered before."""
+        """Write the file, or ``every`` one of the study; or return the question before that.
+
+        Raises
+        ------
+        NewerFileError
+            Another program has changed a file that is not in view.
+        """
         with self._lock:
+            document = self.document
+            document.check_revision(revision)
             try:
-                self.document.save(revision, over_newer=over_newer, over_approved=over_approved)
+                if document.unsaved or not every:
+                    document.save(revision, over_newer=over_newer, over_approved=over_approved)
             except (NewerFileError, ApprovedError) as error:
                 ask = "newer" if isinstance(error, NewerFileError) else "approved"
-                return {**self.document.shown(), "ask": ask}
-            return self.document.shown()
+                return {**self._shown(), "ask": ask, "every": every}
+            try:
+                for path in self._others() if every else ():
+                    study = path if is_protocol(path) else document.study
+                    other = self._opened.get(path) or Document.open(path, study)
+                    other.save(other.revision, over_approved=over_approved)
+            except ApprovedError:
+                return {**self._shown(), "ask": "approved", "every": every}
+            except NewerFileError as error:
+                error.add_note("choose that file in the list at the top, and save it")
+                raise
+            return self._shown()
 
     def reload(self, revision: int) -> dict[str, Any]:
         """Take the file as it is on the disk."""
         with self._lock:
             self.document.reload(revision)
-            return self.document.shown()
+            return self._shown()
 
     def check(self) -> dict[str, Any]:
         """Return what ``labcrane check`` finds in the study as it is now."""
@@ -290,11 +350,14 @@ class Workspace:
         return self._schemas[path]
 
     def run(self, revision: int, command: str, given: dict[str, Any]) -> dict[str, Any]:
-        """Start a command in the study's folder."""
+        """Start a command in the study's folder, once every file of the study is saved."""
         if command not in self._offered:
             raise ProtocolError(f"the page does not offer labcrane {command!r}")
         with self._lock:
             self.document.check_revision(revision)
+            shown = self._shown()
+            if unsaved := [shown["name"]] * shown["unsaved"] + shown["others"]:
+                raise ProtocolError(f"not saved: {', '.join(unsaved)}; save it, then run again")
             number = len(self._jobs)
             words = self._offered[command].words(given)
             job = Job(number, words, self.document.study.parent, self.scratch / f"{number}.txt")
@@ -357,6 +420,12 @@ class Workspace:
             raise ProtocolError(
                 f"labcrane {words[0]} took longer than {PATIENCE_S:g} s; try it in a terminal"
             ) from None
+
+
+def _refusal(path: Path) -> str:
+    there = path.read_text(encoding="utf-8").splitlines()[1:] if path.is_file() else []
+    where = " ".join(there) or "elsewhere"
+    return f"{path.parent} is open in another labcrane start, {where}; go on there, or end that one"
 
 
 def serve(

@@ -166,7 +166,7 @@ const drawBar = () => {
   pick.ariaLabel = t("language");
   pick.replaceChildren(...Object.keys(words).map((each) => h("option", { value: each, selected: each === language }, words[each].own)));
   find("title").textContent = doc ? doc.name : "labcrane";
-  find("state").textContent = !doc ? "" : [doc.folder, doc.unsaved ? t("unsaved") : t("saved"), doc.restored && t("restored"), doc.newer && t("newer"), doc.approved && t("approved")].filter(Boolean).join(" · ");
+  find("state").textContent = !doc ? "" : [doc.folder, doc.unsaved ? t("unsaved") : t("saved"), doc.others.length > 0 && t("others", { count: doc.others.length, names: doc.others.join(", ") }), doc.restored && t("restored"), doc.newer && t("newer"), doc.approved && t("approved")].filter(Boolean).join(" · ");
   const files = () => h("select", { id: "file", ariaLabel: t("file"), onchange: ({ target }) => { if (target.value) turn("file", { name: target.value }); else { target.value = doc.name; newFile(); } } },
     [...new Set([...doc.protocols, ...doc.files])].map((each) => h("option", { selected: each === doc.name }, each)), h("option", { value: "" }, t("new_file")));
   const tab = (name) => h("button", { id: `tab-${name}`, "aria-pressed": String(view === name), onclick: () => { view = name; draw(); } }, t(name));
@@ -182,7 +182,7 @@ const save = (about = {}) => change("save", about);
 const question = (kind) => {
   const box = find("question"), close = (run) => { box.close(); run?.(); };
   box.ariaLabel = t("save");
-  const over = kind === "newer" ? { over_newer: true } : { over_newer: doc.newer, over_approved: true };
+  const over = { every: doc.every, ...(kind === "newer" ? { over_newer: true } : { over_newer: doc.newer, over_approved: true }) };
   box.replaceChildren(h("p", {}, t(`ask_${kind}`)), h("div", { className: "row" },
     h("button", { id: "over", onclick: () => close(() => save(over)) }, t(kind === "newer" ? "over" : "save_anyway")),
     kind === "newer" ? h("button", { id: "reload", onclick: () => close(() => change("reload")) }, t("reload")) : null,
@@ -244,12 +244,17 @@ const drawPlan = async () => {
       h("tbody", {}, told.sessions.map(row))));
 };
 
+// Folders of output: simulated, simulated-2 and so on.
+const numbered = (name, number) => number === 1 ? name : `${name}-${number}`;
+const count = (name, number = 1) => desk.folders.includes(numbered(name, number)) ? count(name, number + 1) : number - 1;
+const fresh = (name) => numbered(name, count(name) + 1), newest = (name) => numbered(name, Math.max(1, count(name)));
 // What a study needs in turn, with the settings that are usual; each is a command of the list below it.
 const TASKS = [["rehearse", "check", { rehearse: true }], ["picture", "feedback preview", { folder: "pictures" }], ["pages", "pages", {}],
-  ["people", "simulate", { folder: "simulated", participants: "10" }], ["their_report", "report", { data: "simulated", folder: "simulated-report", include: "simulated" }],
+  ["people", "simulate", { folder: () => fresh("simulated"), participants: "10" }],
+  ["their_report", "report", { data: () => newest("simulated"), folder: () => `${newest("simulated")}-report`, include: "simulated" }],
   ["power", "power", { folder: "power", participants: "12,24", pool: "24", cohorts: "200" }], ["preregistration", "methods", { planned: true }],
   ["computer", "doctor", {}], ["pilot", "run", { participant: "P001", pilot: true }], ["go_on", "resume", { participant: "P001", pilot: true }],
-  ["overview", "study", {}], ["report", "report", { include: "pilot", folder: "pilot-report" }], ["tables", "export", { to: "tables", folder: "tables", include: "pilot" }]];
+  ["overview", "study", {}], ["report", "report", { include: "pilot", folder: "pilot-report" }], ["tables", "export", { to: "tables", folder: () => fresh("tables"), include: "pilot" }]];
 let settings = {}, allOpen = false, task = "";
 // The effect whose power is asked for: the first two groups of a study that has groups.
 const effect = () => {
@@ -262,7 +267,8 @@ const drawDo = async () => {
   desk.jobs.forEach((each) => jobs.set(each.number, each));
   const one = desk.commands.find((each) => each.name === command), sections = [...new Set(desk.commands.map((each) => each.section))];
   const preset = (option) => option.flag === "" && !option.required && option.kind === "text" ? doc.study : "";
-  given = Object.fromEntries(one.options.map((each) => [each.name, settings[each.name] ?? (each.kind === "flag" ? null : preset(each))]));
+  const usual = (name) => typeof settings[name] === "function" ? settings[name]() : settings[name];
+  given = Object.fromEntries(one.options.map((each) => [each.name, usual(each.name) ?? (each.kind === "flag" ? null : preset(each))]));
   const input = (option, at) => option.kind === "flag"
     ? h("select", { id: `option-${at}`, onchange: (event) => { given[option.name] = event.target.value === "" ? null : event.target.value === "yes"; } },
       h("option", { value: "" }, t("default")), h("option", { value: "yes", selected: given[option.name] === true }, t("yes")), option.off ? h("option", { value: "no" }, t("no")) : null)
@@ -287,10 +293,12 @@ const drawDo = async () => {
       h("div", { id: "links", className: "row" }), h("div", { id: "reports", className: "row" }), h("div", { id: "pictures" }))));
   drawJob();
 };
-// What runs is the file: it is saved first, and only if nothing has to be asked.
+// What runs are the files: all are saved first, and only if nothing has to be asked.
 const start = async (given) => {
-  if (doc.unsaved) {
-    take(await ask("save", { revision: doc.revision }));
+  if (doc.unsaved || doc.others.length) {
+    try {
+      take(await ask("save", { revision: doc.revision, every: true }));
+    } catch (error) { take(await ask("show")); throw error; }
     if (doc.ask) return;
   }
   const job = await ask("run", { revision: doc.revision, command, given });

@@ -94,6 +94,15 @@ def test_an_approved_study_is_saved_only_if_that_is_agreed_to(path: Path) -> Non
     assert path.read_text(encoding="utf-8") == TEXT + "a: 1\n"
 
 
+def test_the_texts_of_a_folder_with_an_approved_protocol_are_part_of_its_study(path: Path) -> None:
+    """The instructions were written over unasked while another protocol was open."""
+    path.with_name("keyboard.lock.json").write_text("{}", encoding="utf-8")
+    file = path.with_name("instructions.md")
+    file.write_text("Approved.\n", encoding="utf-8")
+    assert Document.open(file, path).approved
+    assert not Document.open(path).approved, "a protocol has its own lock"
+
+
 def test_two_windows_do_not_overwrite_each_other(path: Path) -> None:
     document = Document.open(path)
     document.change(0, TEXT + "a: 1\n")

@@ -229,6 +229,52 @@ def test_a_command_runs_with_its_line_its_output_and_a_stop(page: Page) -> None:
     wait_for(lambda: text(page.browser, "status") not in {"Running", ""})
 
 
+def test_a_command_sees_every_file_as_it_was_typed(page: Page, lab: Path) -> None:
+    """It ran with the protocol as it was on the disk, while the plan showed what was typed."""
+    page.copied()
+    page.at("participants").click()
+    page.write("8", "participants", "planned")
+    wait_for(lambda: "planned: 8" in page.yaml())
+    Select(page.browser.find_element(By.ID, "file")).select_by_visible_text("instructions.md")
+    wait_for(lambda: "other files not saved: 1 (protocol.yaml)" in text(page.browser, "state"))
+    page.press("tab-do")
+    wait_for(lambda: page.browser.find_elements(By.ID, "all"))
+    page.press("all > summary")
+    page.press("all [data-place=plan]")
+    wait_for(lambda: "labcrane plan" in page.browser.find_element(By.ID, "main").text)
+    page.press("start")
+    wait_for(lambda: "balanced" in text(page.browser, "log"))
+    assert "P008" in text(page.browser, "log")
+    assert "P009" not in text(page.browser, "log")
+    assert "other files" not in text(page.browser, "state")
+
+
+def test_each_simulation_has_a_new_folder_and_the_report_is_of_the_newest(
+    page: Page, lab: Path
+) -> None:
+    page.copied()
+    (lab / "mine" / "simulated").mkdir()
+    (lab / "mine" / "tables").mkdir()
+    page.press("tab-do")
+
+    def preset(task: str) -> list[str]:
+        page.press(f"main [data-place={task}]")
+        wait_for(
+            lambda: page.browser.find_elements(
+                By.CSS_SELECTOR, f"[data-place={task}][aria-pressed=true]"
+            )
+        )
+        fields = page.browser.find_elements(By.CSS_SELECTOR, "input[id^=option-]")
+        return [each.get_attribute("value") for each in fields]
+
+    assert "simulated-2" in preset("people")
+    assert {"simulated", "simulated-report"} <= {*preset("their_report")}
+    assert "tables-2" in preset("tables")
+    (lab / "mine" / "simulated-2").mkdir()
+    assert "simulated-3" in preset("people")
+    assert {"simulated-2", "simulated-2-report"} <= {*preset("their_report")}
+
+
 REPLACE = """
 const box = document.getElementById('yaml');
 box.value = arguments[0];

@@ -85,6 +85,54 @@ def test_a_study_that_another_start_page_has_open_is_refused_with_its_address(
     assert not list(workspace.root.glob("*/.labcrane-start"))
 
 
+def test_a_folder_that_is_open_is_held_with_the_folders_in_it(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    new_study("crossover", workspace.root / "mine" / "sub")
+    other = Workspace(workspace.root, [], [], tmp_path)
+    for held, refused in (("mine", "mine/sub"), ("mine/sub", "mine")):
+        workspace.open(f"{held}/protocol.yaml")
+        with pytest.raises(StorageError, match=f"{held} is open in another labcrane start"):
+            other.open(f"{refused}/protocol.yaml")
+        assert not (workspace.root / refused / ".labcrane-start").exists()
+        workspace.close()
+        workspace = Workspace(workspace.root, [], [], tmp_path)
+    workspace.open("mine/protocol.yaml")
+    workspace.file("sub/protocol.yaml")
+    workspace.open("mine/protocol.yaml")
+    workspace.close()
+    other.open("mine/sub/protocol.yaml")
+    other.open("mine/protocol.yaml")
+    other.close()
+
+
+def test_nothing_runs_before_every_file_of_the_study_is_saved(workspace: Workspace) -> None:
+    told = workspace.open("mine/protocol.yaml")
+    workspace.edit(told["revision"], "set", ["participants", "planned"], 48)
+    file = workspace.root / "mine" / "instructions.md"
+    told = workspace.file("instructions.md")
+    assert (told["unsaved"], told["others"]) == (False, ["protocol.yaml"])
+    with pytest.raises(ProtocolError, match=r"not saved: protocol\.yaml"):
+        workspace.run(told["revision"], "plan", {"protocol": "protocol.yaml"})
+    told = workspace.splice(told["revision"], 0, 0, "Read this.\n")
+    workspace.close()
+    again = Workspace(workspace.root, [], [], workspace.scratch)
+    told = again.open("mine/protocol.yaml")
+    assert (told["unsaved"], told["others"]) == (True, ["instructions.md"]), "left by the first"
+    file.with_name("protocol.lock.json").write_text("{}", encoding="utf-8")
+    assert again.save(told["revision"], every=True)["ask"] == "approved"
+    before = file.read_bytes()
+    file.write_text("by another program", encoding="utf-8")
+    with pytest.raises(ProtocolError, match=r"instructions\.md was changed by another program"):
+        again.save(told["revision"], over_approved=True, every=True)
+    file.write_bytes(before)
+    told = again.save(told["revision"], over_approved=True, every=True)
+    assert (told["unsaved"], told["others"]) == (False, [])
+    assert file.read_text(encoding="utf-8").startswith("Read this.\n")
+    assert "planned: 48" in file.with_name("protocol.yaml").read_text(encoding="utf-8")
+    again.close()
+
+
 def test_text_files_are_kept_and_saved_as_the_protocol_is(workspace: Workspace) -> None:
     protocol = workspace.open("mine/protocol.yaml")
     edit = ("set", ["participants", "planned"], 48)
