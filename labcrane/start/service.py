@@ -142,7 +142,7 @@ class Workspace:
         """Return the folders in that of the open study: a command can be given a new one."""
         if self._document is None:
             return []
-        return [each.name for each in self._document.study.parent.iterdir() if each.is_dir()]
+        return [each.name for each in self._document.study.parent.glob("*") if each.is_dir()]
 
     def open(self, path: str) -> dict[str, Any]:
         """Open a study of the folder, or one that was open before."""

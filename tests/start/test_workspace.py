@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -104,6 +105,14 @@ def test_a_folder_that_is_open_is_held_with_the_folders_in_it(
     other.open("mine/sub/protocol.yaml")
     other.open("mine/protocol.yaml")
     other.close()
+
+
+def test_a_study_whose_folder_is_removed_can_be_left_for_another(workspace: Workspace) -> None:
+    workspace.open("mine/protocol.yaml")
+    new_study("crossover", workspace.root / "other")
+    shutil.rmtree(workspace.root / "mine")
+    assert workspace.studies()["here"] == ["other/protocol.yaml"]
+    assert workspace.open("other/protocol.yaml")["data"]
 
 
 def test_nothing_runs_before_every_file_of_the_study_is_saved(workspace: Workspace) -> None:
