@@ -55,6 +55,21 @@ const places = [...document.querySelectorAll('[data-place]')];
 const found = places.find(e => e.dataset.place === arguments[0]);
 return found && `${found.disabled ? 'disabled' : 'enabled'}: ${found.closest('.field').innerText}`;
 """
+NAME = """
+const field = document.getElementById('file-name');
+if (!field) return false;
+field.value = arguments[0];
+field.dispatchEvent(new Event('input'));
+return true;
+"""
+CHOOSE = """
+const list = document.getElementById(arguments[0]);
+const found = [...(list?.options ?? [])].find(e => e.text === arguments[1]);
+if (!found) return false;
+list.value = found.value;
+list.dispatchEvent(new Event('change'));
+return true;
+"""
 BUTTON = """
 const found = [...document.querySelectorAll('button')].find(e => e.textContent === arguments[0]);
 found?.click();
@@ -80,6 +95,10 @@ class Page:
         wait_for(lambda: self.browser.execute_script(AT, wanted))
         return self.browser.execute_script(AT, wanted)
 
+    def choose(self, ident: str, wanted: str) -> None:
+        """Choose by its text in a list, in one go."""
+        wait_for(lambda: self.browser.execute_script(CHOOSE, ident, wanted))
+
     def pick(self, *place: object) -> None:
         """Click at a place in one go; the page may draw it anew at any time."""
         wanted = json.dumps(list(place), separators=(",", ":"))
@@ -103,7 +122,7 @@ class Page:
         return str(self.browser.execute_script("return document.getElementById('yaml').value"))
 
     def copied(self, name: str = "mine") -> None:
-        Select(self.browser.find_element(By.ID, "shipped")).select_by_visible_text("aiming")
+        self.choose("shipped", "aiming")
         field = self.browser.find_element(By.ID, "name")
         field.clear()
         field.send_keys(name)
@@ -261,7 +280,7 @@ def test_a_command_sees_every_file_as_it_was_typed(page: Page, lab: Path) -> Non
     page.at("participants").click()
     page.write("8", "participants", "planned")
     wait_for(lambda: "planned: 8" in page.yaml())
-    Select(page.browser.find_element(By.ID, "file")).select_by_visible_text("instructions.md")
+    page.choose("file", "instructions.md")
     wait_for(lambda: "other files not saved: 1 (protocol.yaml)" in text(page.browser, "state"))
     page.press("tab-do")
     wait_for(lambda: page.browser.find_elements(By.ID, "all"))
@@ -358,12 +377,11 @@ def test_instructions_are_opened_at_their_step_edited_and_saved(page: Page, lab:
     page.press("save")
     file = lab / "mine" / "instructions.md"
     wait_for(lambda: file.read_text(encoding="utf-8") == "Move the crane 🏗.\n")
-    Select(page.browser.find_element(By.ID, "file")).select_by_visible_text("New file")
-    page.browser.find_element(By.ID, "file-name").send_keys(Keys.CONTROL, "a")
-    page.browser.find_element(By.ID, "file-name").send_keys("tlx.yaml")
+    page.choose("file", "New file")
+    wait_for(lambda: page.browser.execute_script(NAME, "tlx.yaml"))
     page.press("make")
     wait_for(lambda: text(page.browser, "title") == "tlx.yaml")
-    Select(page.browser.find_element(By.ID, "file")).select_by_visible_text("protocol.yaml")
+    page.choose("file", "protocol.yaml")
     wait_for(lambda: text(page.browser, "title") == "protocol.yaml")
     assert page.at("title").get_attribute("value") == "Mine", "unsaved, and kept"
     assert complaints(page.browser) == []
@@ -385,7 +403,7 @@ def test_the_plan_of_each_participant_is_a_table(page: Page) -> None:
 
 
 def test_the_pages_of_the_participant_are_opened_from_the_strip(page: Page) -> None:
-    Select(page.browser.find_element(By.ID, "shipped")).select_by_visible_text("whole")
+    page.choose("shipped", "whole")
     page.press("copy")
     page.is_fine()
     page.at("sessions", 0, "steps", 0, "pages").send_keys(Keys.ENTER)
