@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import av
@@ -39,6 +40,9 @@ BACK = 3
 
 DROPPED = 1.5
 """From so many periods between two stamps on, frames are missing between them."""
+
+USUAL = 5
+"""The period of pictures is the middle one of so many steps before."""
 
 
 class FilmedSource(Capture):
@@ -197,6 +201,7 @@ class _File:
         self._out: Any = av.open(self._disk, "w", format="matroska", options=CLUSTER)
         self._first: int | None = None
         self._last: tuple[int, float] | None = None
+        self._steps: deque[float] = deque(maxlen=USUAL)
         self._waiting: deque[Captured] = deque()
         self._muxed = self._given = 0
         self._stream: Any
@@ -223,8 +228,12 @@ class _File:
         if self._last is not None:
             before, stamp = self._last
             gap = timed.pts - stamp
-            steps = round(gap / period) if period and gap > DROPPED * period else 1
-            number = before + steps
+            # In the dark a camera sends fewer pictures than it declares, and drops none.
+            usual = period
+            if self._stream.type == "video":
+                usual = median(self._steps) if len(self._steps) == USUAL else max(period, gap)
+            number = before + (round(gap / usual) if usual and gap > DROPPED * usual else 1)
+            self._steps.append(gap)
         self._last = number, timed.pts
         self._waiting.append(replace(timed, number=number, pts=float(at * MS)))
         size = self._disk.size

@@ -62,6 +62,14 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return there / f"{there.name}.h5"
 
 
+SHOWN = "return document.getElementById('film-face')?.dataset.at"
+CODED = """
+const shown = document.getElementById('film-face').dataset.at;
+document.body.dispatchEvent(new KeyboardEvent('keydown', {key: arguments[0], bubbles: true}));
+return shown;
+"""
+
+
 @contextmanager
 def viewing(file: Path, browser: webdriver.Chrome, *words: str) -> Iterator[None]:
     command = [sys.executable, "-m", "labcrane", "view", str(file), *words]
@@ -198,6 +206,12 @@ def test_behaviour_is_coded_by_keys_and_saved_at_once(
         browser.execute_script(GO, 4.0)
         page.send_keys("x")
         wait_for(lambda: coded() == [*whole, (4.0, 4.0, "points", "AB")])
+        browser.execute_script(GO, 0.5)
+        browser.find_element(By.ID, "play").click()
+        wait_for(lambda: float(browser.execute_script(SHOWN) or 0.0) > 0.7)
+        shown = round(float(browser.execute_script(CODED, "x")), 3)
+        wait_for(lambda: len(coded()) == len(whole) + 2)
+        assert (shown, shown, "points", "AB") in coded()  # of the picture, not of the clock
         check(browser, "viewer with codes")
     (kept,) = file.parent.glob("*_annotations.jsonl")
     assert stat.S_IMODE(kept.stat().st_mode) == stat.S_IMODE(file.stat().st_mode)

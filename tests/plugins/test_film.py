@@ -192,6 +192,14 @@ def test_frames_that_the_device_left_out_are_counted(tmp_path: Path) -> None:
     assert missed >= len(told) / 9 - 1.5  # a busy computer leaves out more
 
 
+def test_a_camera_that_sends_half_of_the_pictures_it_declares_drops_none(tmp_path: Path) -> None:
+    film = camera(f"{CLOCKED},select='not(mod(n,2))'")  # as in the dark
+    told = [frame for frames in recorded(film, tmp_path / "a.mkv", 2.0) for frame in frames]
+    told += film.end()
+    film.close()
+    assert [frame.number for frame in told] == list(range(len(told)))
+
+
 def test_a_stamp_of_another_clock_is_not_taken_for_one_of_ours() -> None:
     now = time.perf_counter()
     assert stamps.StampClock().time_of(12.5, now) is None

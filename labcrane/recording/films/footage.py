@@ -61,7 +61,7 @@ class Footage:
         self.time_error: FloatArray = stream.time_error[order]
         self._folder, self._session = folder, session
         self._follows = (np.diff(self._file) == 0) & (np.diff(self._number) == 1)
-        steps = np.diff(self.time)[self._follows]
+        steps = np.diff(self.time)[np.diff(self._file) == 0]
         self.period_s = float(np.median(steps)) if len(steps) else 0.0
         self._reading = Lock()  # each question of a page has a thread of its own
         self._reader: FilmFile | None = None

@@ -3,7 +3,7 @@
 
 import { axes, Chart, short } from "labcrane-chart";
 
-const STEP_MS = 60, AGAIN_MS = 2000, SOON_MS = 150;
+const STEP_MS = 60, AGAIN_MS = 2000, SOON_MS = 150, BEHIND_S = 0.1;
 
 export default {
   components: { Chart },
@@ -225,6 +225,7 @@ export default {
       this.listen();
       if (!this.playing) return;
       if (this.t >= this.about.length) { this.playing = false; return; }
+      if (this.about.filmed.some((name) => this.open[`film ${name}`]) && Math.abs(this.t - this.seen()) > BEHIND_S) return; // pictures are in step
       this.go(this.t + passed * this.speed);
     },
     hear(name) {
@@ -277,15 +278,19 @@ export default {
       this.codes.push({ ...this.fresh });
       this.fresh = { key: "", name: "", lasts: false };
     },
+    seen() { // the time of the picture that is on the screen, which is a little behind while it plays
+      const shown = this.playing ? this.about.filmed.map((name) => this.films[name]?.at).filter(Number.isFinite) : [];
+      return shown.length ? Math.max(...shown) : this.t;
+    },
     coded(key) { // a moment; of what lasts, the beginning is saved at once, and replaced when it ends
       const { name, lasts } = this.codes.find((one) => one.key === key), begun = this.lasting[key];
-      const said = { t: this.t, to: this.t, text: name, coder: this.coder };
+      const t = this.seen(), said = { t, to: t, text: name, coder: this.coder };
       if (begun && begun.number === null) return; // its beginning is not saved yet
       if (begun) {
         delete this.lasting[key];
-        this.change({ ...said, t: Math.min(begun.t, this.t), to: Math.max(begun.t, this.t), withdraw: begun.number });
+        this.change({ ...said, t: Math.min(begun.t, t), to: Math.max(begun.t, t), withdraw: begun.number });
       } else if (lasts) {
-        this.lasting[key] = { t: this.t, number: null };
+        this.lasting[key] = { t, number: null };
         this.change({ ...said, begins: key });
       } else this.change(said);
     },
