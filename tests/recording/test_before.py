@@ -44,6 +44,8 @@ ONSET = "movement.onset"
 """It is told as soon as it is known since, and no more with the trial's end."""
 ADDED_SETTINGS = {"axes": [], "button": None, "response": None}
 """What the simulated operator can be told since, and what that is where it is not."""
+FORMER_SETTINGS = {"patience_m": 0.6, "still_m_s": 0.015, "press_s": 0.1}
+"""What it could be told then, and what is the same for all since."""
 DEFINITION = "definition"
 """What columns of the loop and of all trials say of themselves since."""
 ABOUT_THE_FILE = {"README", "dataset_description", "CITATION"}
@@ -161,6 +163,8 @@ def test_the_same_seed_writes_the_same_events(before: Path, now: Path) -> None:
         del block["practice"], block["counted"]
     assert start["components"]["tasks.aiming"]["settings"].pop("onset_share") == 0.05
     operator = again["components"]["input"]["settings"]
+    former = start["components"]["input"]["settings"]
+    assert {name: former.pop(name) for name in FORMER_SETTINGS} == FORMER_SETTINGS
     assert {name: operator.pop(name) for name in ADDED_SETTINGS} == ADDED_SETTINGS
     for part, choice in again["components"].items():
         if part.startswith("questionnaires.") and "text" in choice["settings"]:
