@@ -9,6 +9,16 @@ from labcrane.capture import processes
 from labcrane.capture.config import CaptureConfig
 from labcrane.processes import handle
 
+WAITS = """
+import signal
+import time
+
+for each in (signal.SIGINT, signal.SIGTERM):
+    signal.signal(each, signal.SIG_IGN)
+while True:
+    time.sleep(60.0)
+"""
+
 
 def test_a_recording_that_cannot_be_ended_is_left_and_named(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
@@ -16,12 +26,14 @@ def test_a_recording_that_cannot_be_ended_is_left_and_named(
     monkeypatch.setattr(handle, "KILLED_S", 0.05)
     monkeypatch.setattr(processes, "START_S", 0.0)  # it hangs from the beginning
     monkeypatch.setattr(processes, "STOP_S", 0.05)
+    (tmp_path / "waits_for_a_device.py").write_text(WAITS)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     end = subprocess.Popen.kill
     config = CaptureConfig(
         study=tmp_path, recorded=False, name="face", source="x", journal=tmp_path / "ses-01_run.xdf"
     )
     with monkeypatch.context() as unkillable:
-        unkillable.setattr(processes, "MODULE", "asyncio")  # it waits, and says nothing
+        unkillable.setattr(processes, "MODULE", "waits_for_a_device")
         unkillable.setattr(subprocess.Popen, "kill", lambda self: None)
         left = processes._Handle(config, required=True)
         first = left.pid
