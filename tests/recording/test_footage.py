@@ -118,6 +118,13 @@ def test_a_gap_has_its_words_and_no_old_picture(tmp_path: Path) -> None:
         found.picture(8)
 
 
+def test_a_recording_that_is_called_as_the_journal_has_its_own_file(tmp_path: Path) -> None:
+    for ending, own in ((".xdf", None), (".jsonl", None), (".mkv", "ses-01_run.mkv")):
+        (tmp_path / f"ses-01_run{ending}").touch()
+        found = listed(tmp_path, [(0.0, 0, 1, 0.0)], "run").files[1]
+        assert (found and found.name) == own
+
+
 def test_without_pyav_it_says_what_to_install(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

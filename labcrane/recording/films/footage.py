@@ -22,6 +22,9 @@ LASTS = 1.5
 
 FULL_SCALE = 32_768.0
 
+JOURNALS = frozenset({".xdf", ".jsonl"})
+"""Of the session itself: a recording may be called ``run``, as its journal is."""
+
 
 class FrameList(Protocol):
     """The list of frames, as :class:`labcrane.recording.participant_file.reader.Stream` has it."""
@@ -65,6 +68,7 @@ class Footage:
         self.period_s = float(np.median(steps)) if len(steps) else 0.0
         self._reading = Lock()  # each question of a page has a thread of its own
         self._reader: FilmFile | None = None
+        self._open = 0
 
     def listed(self) -> Iterator[dict[str, Any]]:
         """Yield what is known of each file: name, first and last time, frames, rate, and so on."""
@@ -90,7 +94,7 @@ class Footage:
         for number in np.unique(self._file).astype(int).tolist():
             stem = f"ses-{self._session:02d}_{self.name}" + (f".{number}" if number > 1 else "")
             there = (path for path in self._folder.glob(f"{stem}.*") if path.stem == stem)
-            found[number] = next(there, None)
+            found[number] = next((path for path in there if path.suffix not in JOURNALS), None)
         return found
 
     def row(self, now: float) -> int:
@@ -202,13 +206,13 @@ class Footage:
             yield row, np.concatenate([np.empty(0, np.int16), *samples]), frame.sample_rate
 
     def _at(self, number: int) -> FilmFile:
-        path = self.files[number]
-        if path is None:
-            raise RecordingError(
-                f"{self.name}: file {number} is missing in {self._folder}; put it back there"
-            )
-        if self._reader is None or self._reader.path != path:
-            self._reader = FilmFile(path)
+        if self._reader is None or self._open != number:
+            path = self.files[number]
+            if path is None:
+                raise RecordingError(
+                    f"{self.name}: file {number} is missing in {self._folder}; put it back there"
+                )
+            self._reader, self._open = FilmFile(path), number
         return self._reader
 
 

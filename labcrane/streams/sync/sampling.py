@@ -26,7 +26,11 @@ EXACT = 0.1
 """Stamps that scatter by less than this part of a period leave no doubt which are missing."""
 
 FEW_LOST = 0.1
+"""Where more steps than this part are of several periods, they may be those of polls."""
+
 STRAY_S, SHARP = 3e-4, 8.0
+"""What strays does so by more than the first, and than so many times what most samples do."""
+
 WHOLE = 0.25
 """A step this close to whole periods has lost whole samples."""
 
