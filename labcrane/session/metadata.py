@@ -2,9 +2,10 @@
 
 import hashlib
 import platform
+import sys
 from dataclasses import asdict
 from datetime import UTC, datetime
-from functools import cache
+from functools import lru_cache
 from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any
@@ -46,7 +47,7 @@ def context(visit: Visit, plan: SessionPlan, rig: Rig, run: Run) -> dict[str, An
         "rate_hz": run.rate_hz,
         **_of_study(visit.study, simulated=visit.simulated),
         "facts": rig.metadata(),
-        "versions": dict(_versions()),
+        "versions": dict(_versions(tuple(sys.path))),
         # What a simulation records does not depend on the computer that it is made on.
         "doctor": None if visit.fast else at_start(visit.folder.root),
         "plan": [
@@ -163,8 +164,9 @@ def _started(visit: Visit) -> datetime:
     return datetime.fromtimestamp(0.0, UTC) if visit.fast else datetime.now(UTC)
 
 
-@cache
-def _versions() -> dict[str, str]:
+@lru_cache(maxsize=1)
+def _versions(path: tuple[str, ...]) -> dict[str, str]:
+    """Return those of all that can be imported from ``path``: ``sys.path`` as it is now."""
     return {
         "python": platform.python_version(),
         "system": platform.platform(),

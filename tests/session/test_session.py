@@ -73,6 +73,27 @@ def test_the_participant_file_tells_everything_about_its_making(visit: Visit) ->
     assert units["tip.velocity.x"] == "m/s"
 
 
+def test_versions_are_of_the_plugins_that_can_be_imported_when_a_session_begins(
+    visit: Visit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = tmp_path / "site"
+    information = place / "late-7.dist-info"
+    information.mkdir(parents=True)
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: late\nVersion: 7\n")
+    (information / "entry_points.txt").write_text("[labcrane]\nlate = late\n")
+    (place / "late.py").touch()
+    found = []
+    for path in ([], [str(place)], []):
+        with monkeypatch.context() as here:
+            here.setattr(sys, "path", [*path, *sys.path])
+            again = Visit(
+                visit.study, "P001", 1, tmp_path / f"{len(found)}", simulated=True, fast=True
+            )
+            session = labcrane.open_recording(run(again, ScriptedConsole())).session(1)
+        found.append(session.context["versions"].get("late"))
+    assert found == [None, "7", None]
+
+
 def test_every_number_is_a_flat_float64_column_with_a_unit(visit: Visit) -> None:
     path = run(visit, ScriptedConsole())
     found = []
