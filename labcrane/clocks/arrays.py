@@ -77,6 +77,7 @@ def correct(
     -------
     Corrected
         ``time`` and ``error`` (half width of a 95 % interval) of each sample in seconds,
+        ``terms`` (what the error is the sum of, by name: clock, lag, stamps, losses, shifts),
         ``uneven`` (before dejittering), ``basis`` and a ``quality`` summary.
 
     Raises

@@ -124,7 +124,7 @@ def _corrected(one: _Read, raw: RawStream, end: float | None, limits: Limits) ->
         treatment = _treatment(one)
         captured = one.recorded.header.name.startswith(CAPTURED)
         if captured:
-            terms = [one.group[f"data/{term}"][:] for term in TERMS]
+            terms = {term: one.group[f"data/{term}"][:] for term in TERMS}
             corrected = as_stated(raw.stamps, terms, end)
         else:
             corrected = correct(raw, treatment, end)

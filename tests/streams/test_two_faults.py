@@ -449,3 +449,50 @@ def test_a_delay_before_the_stamp_that_changes_is_stated(stamped: str, way: str,
     if way == "stays":
         # Whether samples were taken when they were stamped, or evenly, nothing tells.
         assert np.median(corrected.error) < 2.0 * np.quantile(np.abs(at - t), 0.95) + 1.0 / rate
+
+
+def made_of(corrected: Corrected) -> dict[str, float]:
+    """Return the stated uncertainty's terms, which add up to it."""
+    terms = corrected.quality.made_of_s
+    assert sum(terms.values()) == pytest.approx(corrected.quality.error_p95_s)
+    return dict(terms)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("why", ["clock", "lag", "stamps", "shifts"])
+def test_an_uncertainty_says_what_it_is_made_of(why: str, seed: int) -> None:
+    random = np.random.default_rng([13, seed, *why.encode()])
+    rate, seconds = float(random.choice([100.0, 250.0, 500.0])), random.uniform(60.0, 200.0)
+    t = 1.0 + np.arange(int(rate * seconds)) / (rate * (1.0 + random.uniform(-5e-5, 5e-5)))
+    clock = some_clock(random)
+    probes, stamps, arrivals = clock.probes(random, t[-1]), clock(t), t + 1e-4
+    size = random.uniform(0.01, 0.04)
+    if why == "clock":
+        probes[:, 2] += size  # half of the round trip may be on either way
+        least = size / 2.0
+    elif why == "lag":
+        arrivals, least = t + size, 0.9 * size
+    elif why == "stamps":
+        stamps = clock(received(random, t, np.zeros(len(t))))
+        arrivals, least = None, 0.0
+    else:
+        stamps = stamps + size * (np.arange(len(t)) > len(t) // 2)
+        arrivals, least = None, 0.9 * size
+    corrected = correct(
+        stamps, probes=probes, arrivals=arrivals, rate_hz=rate, counter=np.arange(len(t))
+    )
+    terms = made_of(corrected)
+    assert max(terms, key=lambda name: terms[name]) == why, terms
+    assert terms[why] >= least
+    np.testing.assert_allclose(sum(corrected.terms.values()), corrected.error)
+
+
+def test_markers_near_a_step_of_their_clock_have_the_step_among_losses() -> None:
+    random = np.random.default_rng(14)
+    t = np.sort(random.uniform(1.0, 200.0, 300))
+    clock = some_clock(random, step=0.04, step_at=100.0)
+    corrected = correct(clock(t), probes=clock.probes(random, t[-1]))
+    near = np.asarray(corrected.terms["losses"]) > 0.0
+    assert 0 < near.sum() < 40
+    assert np.abs(t[near] - 100.0).max() < 10.0
+    np.testing.assert_allclose(corrected.terms["losses"][near], 0.04, atol=1e-3)

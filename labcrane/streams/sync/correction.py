@@ -17,7 +17,6 @@ Nothing recorded is altered, and nothing here depends on when it runs: it can be
 """
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -41,6 +40,7 @@ from labcrane.streams.sync.quality import (
 from labcrane.streams.sync.raw import REMOTE, RTT, RawStream
 from labcrane.streams.sync.sampling import RATE_CHANGE, Sampling, examine, examine_irregular
 from labcrane.streams.sync.stamping.shifts import MOST_S
+from labcrane.streams.sync.terms import Term, Terms, none_of, total, typical
 from labcrane.types import FloatArray
 
 
@@ -108,8 +108,8 @@ class Corrected:
     ----------
     time
         In seconds, shape ``(n,)``; NaN where nothing is known.
-    error
-        How far each may be off at 95 %, in seconds, shape ``(n,)``.
+    terms
+        Why each may be off, and by how much: :class:`~labcrane.streams.sync.terms.Term`.
     uneven
         The times as they are without evening, in seconds, shape ``(n,)``.
     segments
@@ -119,10 +119,15 @@ class Corrected:
     """
 
     time: FloatArray
-    error: FloatArray
+    terms: Terms
     uneven: FloatArray
     segments: tuple[ClockSegment, ...] = field(default_factory=tuple)
     quality: Quality = field(default_factory=Quality)
+
+    @property
+    def error(self) -> FloatArray:
+        """How far each may be off at 95 %, in seconds, shape ``(n,)``: the sum of its terms."""
+        return total(self.terms)
 
     @property
     def basis(self) -> npt.NDArray[np.uint8]:
@@ -160,26 +165,26 @@ def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> C
     own = of == np.arange(len(of))
     found = _on_our_clock(repeats.left_out(raw, own), treatment, end)
     where = repeats.place_of(of)
-    time, error, uneven = found.time[where], found.error[where], found.uneven[where]
+    time, uneven = found.time[where], found.uneven[where]
+    terms = {name: term[where] for name, term in found.terms.items()}
     again = int(np.count_nonzero(~own))
     quality = replace(found.quality, repeated=again)
     if not shown:  # or its clock was set back, and no sample before or after that is sent again
-        error = error + repeats.back_s(raw.stamps)
-        quality = replace(found.quality, backward=again, **_errors(time, error, uneven))
-    return Corrected(time, error, uneven, repeats.put_back(found.segments, own), quality)
+        terms[Term.SHIFTS] = terms[Term.SHIFTS] + repeats.back_s(raw.stamps)
+        quality = replace(found.quality, backward=again, **_errors(time, terms, uneven))
+    return Corrected(time, terms, uneven, repeats.put_back(found.segments, own), quality)
 
 
 MISSING_S = 1.0
 """Frames that are further apart, and by more than three usual steps, have a gap between them."""
 
 
-def as_stated(time: FloatArray, terms: Sequence[FloatArray], end: float | None) -> Corrected:
+def as_stated(time: FloatArray, terms: Terms, end: float | None) -> Corrected:
     """Return the times of captured frames: on our clock already, with a stated uncertainty.
 
     The process that captures is on this computer and converts the device's stamps itself: neither
     probes nor arrivals tell more. An error is NaN where one of its terms is unknown.
     """
-    error = np.sum(terms, axis=0)
     silent = end - float(time[-1]) if end is not None and len(time) else 0.0
     steps = np.diff(time)
     gaps = steps[steps > max(MISSING_S, 3.0 * float(np.median(steps)))] if len(steps) else steps
@@ -187,9 +192,9 @@ def as_stated(time: FloatArray, terms: Sequence[FloatArray], end: float | None) 
         silent_s=silent,
         gaps=len(gaps),
         longest_gap_s=float(gaps.max(initial=0.0)),
-        **_errors(time, error, time),
+        **_errors(time, terms, time),
     )
-    return Corrected(time, error, time, quality=quality)
+    return Corrected(time, terms, time, quality=quality)
 
 
 def _went_back(stamps: FloatArray) -> bool:
@@ -210,23 +215,26 @@ def _some_untold(
     rest = repeats.left_out(raw, told)
     found = correct(rest, treatment, end)
     arrival, count = raw.arrival(), len(raw.stamps)
-    time, error, uneven = (np.full(count, np.nan) for _ in range(3))
+    time, uneven = (np.full(count, np.nan) for _ in range(2))
+    terms = {name: np.zeros(count) for name in found.terms}
+    terms[Term.CLOCK][~told] = np.nan if arrival is None else PULL_S + LATE_S
     segments = repeats.put_back(found.segments, told)
     if arrival is not None:
         time[~told] = uneven[~told] = arrival[~told] - treatment.latency_s
-        error[~told] = PULL_S + LATE_S
     if not told.any():
         basis = Basis.NOTHING if arrival is None else Basis.ARRIVALS
         segments = (ClockSegment(0, count, basis, unsure=0),)
-    time[told], error[told], uneven[told] = found.time, found.error, found.uneven
+    time[told], uneven[told] = found.time, found.uneven
+    for name, term in found.terms.items():
+        terms[name][told] = term
     frozen = int(np.count_nonzero(np.isfinite(raw.stamps[~told])))
     quality = replace(
         found.quality,
         unprobed=found.quality.unprobed + int(np.count_nonzero(~told)),
         frozen=found.quality.frozen + frozen,
-        **_errors(time, error, uneven),
+        **_errors(time, terms, uneven),
     )
-    return Corrected(time, error, uneven, segments, quality)
+    return Corrected(time, terms, uneven, segments, quality)
 
 
 def _on_our_clock(raw: RawStream, treatment: Treatment, end: float | None) -> Corrected:
@@ -238,22 +246,22 @@ def _on_our_clock(raw: RawStream, treatment: Treatment, end: float | None) -> Co
     if found.quality.whose:  # of our clock, or of none that was probed
         return _correct(raw, treatment, end)
     time, uneven = own.ours(found.time), own.ours(found.uneven)
-    error = found.error + own.doubt(time)
-    quality = replace(found.quality, own_slews=own.slews(), **_errors(time, error, uneven))
-    return Corrected(time, error, uneven, found.segments, quality)
+    terms = {**found.terms, Term.CLOCK: found.terms[Term.CLOCK] + own.doubt(time)}
+    quality = replace(found.quality, own_slews=own.slews(), **_errors(time, terms, uneven))
+    return Corrected(time, terms, uneven, found.segments, quality)
 
 
 def _correct(raw: RawStream, treatment: Treatment, end: float | None) -> Corrected:
     if not len(raw.stamps):
         nothing = np.empty(0)
-        return Corrected(nothing, nothing, nothing, quality=Quality(**_trips(raw)))
+        return Corrected(nothing, none_of(0), nothing, quality=Quality(**_trips(raw)))
     regular = treatment.rate_hz > 0.0
     placed = place(raw, epochs(raw, regular=regular), regular=regular)
     sampled = _examined(raw, placed, treatment)
-    time, error = _evened(raw, placed, sampled, treatment)
+    time, terms = _evened(raw, placed, sampled, treatment)
     shift = treatment.transport_s + treatment.latency_s
-    quality = _summed(raw, placed, sampled, (time, error, end), regular=regular)
-    return Corrected(time - shift, error, placed.time - shift, placed.segments, quality)
+    quality = _summed(raw, placed, sampled, (time, terms, end), regular=regular)
+    return Corrected(time - shift, terms, placed.time - shift, placed.segments, quality)
 
 
 def _examined(raw: RawStream, placed: Placement, treatment: Treatment) -> list[_Sampled]:
@@ -304,39 +312,42 @@ def _followed(time: FloatArray, sampling: Sampling) -> _Followed:
 
 def _evened(
     raw: RawStream, placed: Placement, sampled: list[_Sampled], treatment: Treatment
-) -> tuple[FloatArray, FloatArray]:
-    """Return times, dejittered where that helps or is requested, with the remaining errors."""
-    time, error = placed.time.copy(), placed.error.copy()
-    way = treatment.way
+) -> tuple[FloatArray, Terms]:
+    """Return times, dejittered where that helps or is requested, and why they may be off."""
+    time, way = placed.time.copy(), treatment.way
+    terms = {name: term + placed.terms.get(name, 0.0) for name, term in none_of(len(time)).items()}
     declared = treatment.transport_s != 0.0 or treatment.latency_s != 0.0
+    counted = raw.index is not None or not treatment.can_drop_samples
     for segment, sampling, followed in sampled:
         part = slice(segment.start, segment.stop)
         # Nothing tells cut stamps from rounded ones, and so whether they are half a unit early.
-        error[part] += sampling.grid_s / 2.0 + sampling.back_s + sampling.kept_s
-        error[part] += sampling.unsure_s
+        stamps: FloatArray | float = sampling.grid_s / 2.0 + sampling.kept_s
+        losses: FloatArray | float = sampling.unsure_s
+        shifts = sampling.back_s + (sampling.wander_s if counted else 0.0)
         if not declared:  # a mean that is known holds for the middle of a chunk
-            error[part] += sampling.chunk_s
+            stamps += sampling.chunk_s
         if not treatment.can_drop_samples:  # nothing else tells uneven samples from late stamps
-            error[part] += NEARLY_ALL * sampling.uneven_s + sampling.slip_s
-        if raw.index is not None or not treatment.can_drop_samples:
-            error[part] += sampling.wander_s
+            stamps += NEARLY_ALL * sampling.uneven_s
+            losses += sampling.slip_s
         if sampling.shifted is not None:
-            error[part] += sampling.shifted.open_s(segment.stop - segment.start)
+            shifts += sampling.shifted.open_s(segment.stop - segment.start)
         if way is Dejitter.AUTO and followed is not None and segment.basis is Basis.PROBES:
             time[part], doubt = followed
-            error[part] += doubt
+            stamps += doubt
             if sampling.unplaced or sampling.uncounted:
-                error[part] += sampling.noise_s / 2.0
+                losses += sampling.noise_s / 2.0
             # A mean that is declared is that of the session, and none of a while.
             known = (declared and sampling.received is None) or not sampling.late_stamps
-            error[part] += max(sampling.shift_s, 0.0 if known else sampling.noise_s)
+            stamps += max(sampling.shift_s, 0.0 if known else sampling.noise_s)
         elif way in {Dejitter.LEAST_SQUARES, Dejitter.ENVELOPE}:
             index = sampling.index if raw.index is None else raw.index[part]
             time[part] = even(placed.time[part], index, way)
-            error[part] += sampling.noise_s / 4.0 + left_open(placed.time[part], time[part], way)
+            stamps += sampling.noise_s / 4.0 + left_open(placed.time[part], time[part], way)
         else:
-            error[part] += sampling.noise_s + sampling.grid_s / 2.0
-    return time, error
+            stamps += sampling.noise_s + sampling.grid_s / 2.0
+        for name, size in ((Term.STAMPS, stamps), (Term.LOSSES, losses), (Term.SHIFTS, shifts)):
+            terms[name][part] += size
+    return time, terms
 
 
 def _rates(each: list[Sampling]) -> tuple[float, float]:
@@ -364,12 +375,12 @@ def _summed(
     raw: RawStream,
     placed: Placement,
     sampled: list[_Sampled],
-    result: tuple[FloatArray, FloatArray, float | None],
+    result: tuple[FloatArray, Terms, float | None],
     *,
     regular: bool,
 ) -> Quality:
     """Sum up how right the corrected times are, of a recording that ended when it is known."""
-    time, error, end = result
+    time, terms, end = result
     segments, curves = placed.segments, placed.curves
     longest = max(segments, key=lambda part: part.stop - part.start)
     probed = longest.basis is Basis.PROBES
@@ -398,7 +409,7 @@ def _summed(
         ahead_s=placed.ahead_s,
         **_trips(raw),
         backward=_backward(time) if regular else sum(one.behind for _, one, _ in sampled),
-        **_errors(time, error, placed.time),
+        **_errors(time, terms, placed.time),
         **_flow(placed, sampled, regular=regular),
     )
 
@@ -415,17 +426,19 @@ def _backward(time: FloatArray) -> int:
     return int(np.count_nonzero(np.maximum.accumulate(known) - known > BACK_S))
 
 
-def _errors(time: FloatArray, error: FloatArray, uneven: FloatArray) -> dict[str, Any]:
-    """Return how far the times may be off, and how far evening moved them."""
+def _errors(time: FloatArray, terms: Terms, uneven: FloatArray) -> dict[str, Any]:
+    """Return how far the times may be off, and why, and how far evening moved them."""
+    error = total(terms)
     known = np.isfinite(time) & np.isfinite(error)
     if not known.any():
         return {}
-    p50, p95 = np.quantile(error[known], (0.5, 0.95))
+    p95, made_of = typical(terms, time)
     moved, furthest = np.quantile(np.abs(time - uneven)[known], (0.95, 1.0))
     worst, worst_at = worst_second(time, error)
     return {
-        "error_p50_s": float(p50),
-        "error_p95_s": float(p95),
+        "error_p50_s": float(np.median(error[known])),
+        "error_p95_s": p95,
+        "made_of_s": made_of,
         "worst_s": worst,
         "worst_at_s": worst_at,
         "moved_p95_s": float(moved),

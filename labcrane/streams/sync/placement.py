@@ -12,6 +12,7 @@ from labcrane.streams.sync.quality import Basis, ClockSegment
 from labcrane.streams.sync.raw import REMOTE, RawStream
 from labcrane.streams.sync.smoother import smooth
 from labcrane.streams.sync.steady_sampler import SteadySampler
+from labcrane.streams.sync.terms import Term, Terms
 from labcrane.types import FloatArray
 
 WRONG_CLOCK_S = 0.25
@@ -76,8 +77,10 @@ class Placement:
 
     Attributes
     ----------
-    time, error
-        In seconds, shape ``(n,)``: where a sample is, and how far it may be off at 95 %.
+    time
+        Where each sample is, in seconds, shape ``(n,)``.
+    terms
+        Why it may be elsewhere, and by how much.
     segments
         Stretches of one clock.
     curves
@@ -95,7 +98,7 @@ class Placement:
     """
 
     time: FloatArray
-    error: FloatArray
+    terms: Terms
     segments: tuple[ClockSegment, ...] = field(default_factory=tuple)
     curves: tuple[OffsetCurve, ...] = ()
     least_lag: float = np.nan
@@ -119,19 +122,29 @@ def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placement
         whose = _stamped_by(raw.stamps, arrival, (least, hidden), regular=regular)
     known = raw, arrival, stretches
     time, error, segments = _placed(known, curves, least, whose, regular=regular)
+    near, late = _near_steps(segments, len(time)), np.zeros(len(time))
     if arrival is not None and np.isfinite(least) and not whose:
-        lags = _lags(time, error, arrival, regular=regular)
+        lags = _lags(time, error + near, arrival, regular=regular)
         if lags is None:
             whose = "foreign"
             time, error, segments = _placed(known, curves, least, whose, regular=regular)
+            near = _near_steps(segments, len(time))
         else:
-            ahead = 0.0 if regular else _ahead(arrival - time, error)
-            error = np.maximum(error + ahead, lags)
+            ahead = 0.0 if regular else _ahead(arrival - time, error + near)
+            late = np.maximum(ahead, lags - error - near)
     if whose:
         curves = [None] * len(stretches)
     probed = tuple(curve for curve in curves if curve is not None)
-    frozen = _hold_frozen(raw.stamps, time, error) if regular else (0, 0)
-    return Placement(time, error, segments, probed, least, whose, *frozen, ahead)
+    stands, frozen = np.zeros(len(time)), (0, 0)
+    if regular:
+        frozen = _hold_frozen(raw.stamps, time, stands)
+    terms: dict[str, FloatArray] = {
+        Term.CLOCK: error,
+        Term.LAG: late,
+        Term.STAMPS: stands,
+        Term.LOSSES: near,
+    }
+    return Placement(time, terms, segments, probed, least, whose, *frozen, ahead)
 
 
 def _ahead(lag: FloatArray, error: FloatArray) -> float:
@@ -197,7 +210,6 @@ def _placed(
     pieces = _pieces(raw, arrival, stretches, curves, (least, time, error, whose), regular=regular)
     arrived = arrival is not None
     segments = tuple(_segment(*piece, known=arrived) for piece in _joined(pieces))
-    _blur_steps(segments, error)
     return time, error, segments
 
 
@@ -527,8 +539,9 @@ def _segment(
     )
 
 
-def _blur_steps(segments: tuple[ClockSegment, ...], error: FloatArray) -> None:
-    """Let samples that may be of the clock before be as uncertain as the step is large."""
+def _near_steps(segments: tuple[ClockSegment, ...], count: int) -> FloatArray:
+    """Return by how much samples near a step may be off: they may be of the clock before."""
+    error = np.zeros(count)
     for before, after in itertools.pairwise(segments):
         if after.unsure:
             near = slice(
@@ -536,3 +549,4 @@ def _blur_steps(segments: tuple[ClockSegment, ...], error: FloatArray) -> None:
                 min(after.start + after.unsure, after.stop),
             )
             error[near] += abs(after.step_s)
+    return error

@@ -1,7 +1,7 @@
 """Quality of a stream's corrected times."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -52,6 +52,8 @@ class Quality:
     ----------
     error_p50_s, error_p95_s
         The stated uncertainty, at 95 %, of half of the samples and of nearly all.
+    made_of_s
+        What the latter is made of, by the name of each term.
     worst_s, worst_at_s
         The largest uncertainty over a second, and when that second begins, on our clock.
     hidden_s
@@ -122,6 +124,7 @@ class Quality:
 
     error_p50_s: float = np.nan
     error_p95_s: float = np.nan
+    made_of_s: Mapping[str, float] = field(default_factory=dict)
     worst_s: float = np.nan
     worst_at_s: float = np.nan
     hidden_s: float = np.nan

@@ -49,9 +49,10 @@ def quality_of(corrected: Corrected, treatment: Treatment) -> dict[str, float | 
         f"{part.drift_ppm:+.3f} ppm"
         for part in corrected.segments
     )
+    each = asdict(corrected.quality)
+    each |= {f"error_p95_{name}_s": size for name, size in each.pop("made_of_s").items()}
     quality: dict[str, float | str] = {
-        name: value if isinstance(value, str) else float(value)
-        for name, value in asdict(corrected.quality).items()
+        name: value if isinstance(value, str) else float(value) for name, value in each.items()
     }
     return quality | {
         "segments": segments,

@@ -9,6 +9,7 @@ from enum import StrEnum
 import numpy as np
 
 from labcrane.streams.sync.quality import Quality
+from labcrane.streams.sync.terms import in_words
 
 LONG_S = 1.0
 SILENT_S = 5.0
@@ -110,8 +111,10 @@ def carries(quality: Quality) -> str:
 
 
 def corrections(quality: Quality) -> list[str]:
-    """Return what was done to the stamps, one sentence each."""
+    """Return how well times are known, and what was done to the stamps, one sentence each."""
     done = []
+    if quality.made_of_s:
+        done.append(f"uncertain by {in_words(quality.error_p95_s, quality.made_of_s)}")
     if np.isfinite(quality.drift_ppm):
         done.append(f"mapped from a clock that runs {quality.drift_ppm:+.1f} ppm off")
     for count, what in (

@@ -26,6 +26,7 @@ from labcrane.streams.sync.report.certificate import (
     unknowable,
 )
 from labcrane.streams.sync.report.limits import Limits
+from labcrane.streams.sync.terms import in_words
 
 FURTHEST = 3.0
 """The furthest of many samples lie so much further off than 95 % of them do."""
@@ -370,7 +371,7 @@ def _certainty(quality: Quality, limits: Limits) -> list[Finding]:
     _add(
         found,
         limits.error_s.judge(quality.error_p95_s),
-        f"its times may be off by {1e3 * quality.error_p95_s:.2f} ms",
+        f"its times may be off by {in_words(quality.error_p95_s, quality.made_of_s)}",
         f"they are accurate enough for {carries(quality)}",
     )
     if not quality.error_p95_s > limits.error_s.warn and quality.worst_s > limits.error_s.warn:
