@@ -1,5 +1,6 @@
 """Correction of other clocks' timestamps on plain arrays, for any recording."""
 
+from collections.abc import Collection
 from typing import Literal
 
 import numpy as np
@@ -10,6 +11,7 @@ from labcrane.streams.sync.correction import Corrected, Treatment
 from labcrane.streams.sync.correction import correct as correct_raw
 from labcrane.streams.sync.dejitter import Dejitter
 from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.sampling import Stamped
 
 __all__ = ["Corrected", "correct"]
 
@@ -26,7 +28,7 @@ def correct(
     rate_hz: float = 0.0,
     latency_s: float = 0.0,
     evening: Literal["auto", "forbid", "force"] = "auto",
-    pauses: bool = False,
+    stamped: Literal["", "at_sampling", "when_sent"] = "",
     end: float | None = None,
     own_clock: npt.ArrayLike | None = None,
 ) -> Corrected:
@@ -63,9 +65,11 @@ def correct(
     evening
         Whether timestamps of a regular stream are dejittered: only if they evidently scatter about
         a steady sample clock (``"auto"``), never, or always.
-    pauses
-        Whether the sampler is declared to pause: timestamps that are later from one sample on are
-        right then. Otherwise ``error`` includes the step.
+    stamped
+        When samples of a regular stream get their timestamps, if that is known. At sampling: they
+        are the samples' own times, a step to later is a pause, and what scatters are the samples.
+        When sent: each is late by a wait that changes. Otherwise ``error`` includes what either
+        leaves open.
     end
         When the recording ended, on the receiver's clock: shows that a source died before.
     own_clock
@@ -103,8 +107,10 @@ def correct(
     >>> bool(np.abs(corrected.time - np.arange(0.0, 60.0, 0.01)).max() < 1e-5)
     True
     """
-    if evening not in EVENING:
-        raise RecordingError(f"evening is {evening!r}; it may be {', '.join(EVENING)}")
+    _chosen("evening", evening, EVENING)
+    _chosen("stamped", stamped, [one.value for one in Stamped])
+    if stamped == "at_sampling" and evening == "force":
+        raise RecordingError("evening is 'force', but timestamps of samples' own times stay")
     _known("rate_hz", rate_hz, least=0.0)
     _known("latency_s", latency_s)
     if end is not None:
@@ -140,9 +146,17 @@ def correct(
                 f"one that nothing adjusts; they have the shape {own.shape}"
             )
     treatment = Treatment(
-        rate_hz=rate_hz, pauses=pauses, latency_s=latency_s, dejitter=EVENING[evening]
+        rate_hz=rate_hz,
+        stamped=Stamped(stamped),
+        latency_s=latency_s,
+        dejitter=EVENING[evening],
     )
     return correct_raw(RawStream.of(taken, shown, came, index=index, own=own), treatment, end)
+
+
+def _chosen(name: str, value: str, choices: Collection[str]) -> None:
+    if value not in choices:
+        raise RecordingError(f"{name} is {value!r}; it may be {', '.join(map(repr, choices))}")
 
 
 def _known(name: str, value: float, least: float = -np.inf) -> None:

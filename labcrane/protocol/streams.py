@@ -68,10 +68,11 @@ class StreamNeed(Settings):
     """Whether timestamps of a regular stream are dejittered: only where they demonstrably scatter
     about a steady sample clock, never, or always. The times before dejittering are kept as well."""
 
-    pauses: bool = False
-    """Whether its sampler pauses now and then, as an eye tracker does that stores its data.
-    Timestamps that are later from one sample on are then right. Otherwise they may be of a clock
-    that was set, and their uncertainty includes the step."""
+    stamped: Literal["at_sampling", "when_sent"] | None = None
+    """When samples of a regular stream get their timestamps, if its maker states that. With
+    ``at_sampling`` they are the samples' own times: a step to later is a pause of the sampler, and
+    what scatters are the samples. With ``when_sent`` each is late by a wait that changes. Without
+    it, the uncertainty includes what either leaves open."""
 
     sees: dict[str, str] = Field(default_factory=dict)
     """Channels of a photodiode, a microphone or an accelerometer, by label, each with the view,
@@ -87,6 +88,13 @@ class StreamNeed(Settings):
                 "min_delay_s needs dejittering, to find the least delayed samples; remove it, or "
                 "do not write evening: forbid",
                 at=("min_delay_s",),
+            )
+        late = self.min_delay_s is not None or self.evening == "force"
+        if self.stamped == "at_sampling" and late:
+            raise WrongKey(
+                "stamped: at_sampling keeps timestamps as they are; remove it, or min_delay_s and "
+                "evening: force",
+                at=("stamped",),
             )
         return self
 
@@ -132,6 +140,7 @@ class StreamNeed(Settings):
         from labcrane.streams.sync.correction import Treatment  # noqa: PLC0415
         from labcrane.streams.sync.dejitter import Dejitter  # noqa: PLC0415
         from labcrane.streams.sync.resync import treatment_of  # noqa: PLC0415
+        from labcrane.streams.sync.sampling import Stamped  # noqa: PLC0415
 
         stated = treatment_of(header)
         ways = {"auto": stated.dejitter, "forbid": Dejitter.NONE, "force": Dejitter.LEAST_SQUARES}
@@ -139,7 +148,7 @@ class StreamNeed(Settings):
         return Treatment(
             rate_hz=stated.rate_hz,
             can_drop_samples=stated.can_drop_samples,
-            pauses=self.pauses,
+            stamped=Stamped(self.stamped or ""),
             dejitter=Dejitter.ENVELOPE if late else ways[self.evening],
             transport_s=self.min_delay_s or 0.0,
             latency_s=stated.latency_s if self.latency_s is None else self.latency_s,

@@ -591,6 +591,7 @@ TRACK = "design:\n  tracks: {t: {factor: pairs, levels: {2m_far_left: 2, 4m_far_
         ("design:", TRACK % "up_down: {}, rounds: 5", "5}}", "there are 5 rounds"),
         ("machine: ch8 ", "machine: {urdf: a.urdf, joints: [a, b, c], tip: t, mjcf: a.xml} ", "a.xml", "described by one file"),
         ("design:", "streams: {a: {type: EEG, evening: forbid, min_delay_s: 0.01}}\ndesign:", "0.01}", "or do not write evening: forbid"),
+        ("design:", "streams: {a: {type: EEG, stamped: at_sampling, min_delay_s: 0.01}}\ndesign:", "at_sampling", "keeps timestamps as they are"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_of_several_keys_is_told_at_one_of_them(

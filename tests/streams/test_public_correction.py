@@ -61,7 +61,9 @@ def test_a_lag_that_may_be_a_clock_behind_is_in_the_uncertainty(
         ({"rate_hz": -3.0}, "rate_hz is -3.0; it must be a finite number and not negative"),
         ({"latency_s": np.nan}, "latency_s is nan; it must be a finite number"),
         ({"end": np.inf}, "end is inf; it must be a finite number"),
-        ({"evening": "maybe"}, "evening is 'maybe'; it may be auto, forbid, force"),
+        ({"evening": "maybe"}, "evening is 'maybe'; it may be 'auto', 'forbid', 'force'"),
+        ({"stamped": "sent"}, "stamped is 'sent'; it may be '', 'at_sampling', 'when_sent'"),
+        ({"stamped": "at_sampling", "evening": "force"}, "evening is 'force', but timestamps"),
     ],
 )
 def test_arrays_that_do_not_fit_are_refused(wrong: dict, said: str) -> None:

@@ -10,6 +10,8 @@ import pytest
 
 from labcrane.clocks import Corrected, correct
 from labcrane.streams.sync.quality import Basis
+from labcrane.streams.sync.report.limits import Limits
+from labcrane.streams.sync.report.stream_report import judge_quality
 
 PROBED = list(Basis).index(Basis.PROBES)
 
@@ -244,7 +246,8 @@ def test_pauses_that_are_declared_leave_no_doubt_about_right_stamps(seed: int, a
         wrong = set_back(random, t, 0.02, 1)
     given["probes"] = clock.probes(random, t[-1])
     undeclared, declared = (
-        correct(clock(t) - wrong, rate_hz=rate, pauses=pauses, **given) for pauses in (False, True)
+        correct(clock(t) - wrong, rate_hz=rate, stamped=stamped, **given)
+        for stamped in ("", "at_sampling")
     )
     assert undeclared.quality.shifts > declared.quality.shifts == (also == "set back")
     assert declared.quality.gaps > 0
@@ -496,3 +499,59 @@ def test_markers_near_a_step_of_their_clock_have_the_step_among_losses() -> None
     assert 0 < near.sum() < 40
     assert np.abs(t[near] - 100.0).max() < 10.0
     np.testing.assert_allclose(corrected.terms["losses"][near], 0.04, atol=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_stamps_declared_to_be_taken_at_sampling_are_right_where_a_camera_is_uneven(
+    seed: int,
+) -> None:
+    """Without it, nothing tells uneven frames and lost ones from stamps that are late."""
+    random = np.random.default_rng([15, seed])
+    rate, seconds = float(random.choice([15.0, 30.0, 60.0])), random.uniform(60.0, 200.0)
+    t = 1.0 + np.arange(int(rate * seconds)) / rate
+    t += random.exponential(random.uniform(0.01, 0.1) / rate, len(t))
+    t += random.uniform(0.02, 0.4) * (t > random.uniform(0.3, 0.7) * seconds)
+    t = np.delete(t, random.integers(1, len(t), int(random.integers(0, len(t) // 10))))
+    clock = some_clock(random)
+    probes = clock.probes(random, t[-1])
+    found = [
+        correct(clock(t), probes=probes, rate_hz=rate, stamped=stamped)
+        for stamped in ("", "at_sampling")
+    ]
+    undeclared, declared = (np.median(corrected.error) for corrected in found)
+    assert np.mean(np.abs(found[1].time - t) <= found[1].error) >= 0.95
+    assert declared < 5e-4 < undeclared
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_slow_samples_declared_to_be_stamped_when_sent_are_as_uncertain_as_they_wait(
+    seed: int,
+) -> None:
+    """At 1 Hz, 0.1 ms were stated where stamps were 1.6 ms late and nothing showed it."""
+    random = np.random.default_rng([16, seed])
+    rate, seconds = random.uniform(0.8, 2.0), random.uniform(100.0, 600.0)
+    t = 1.0 + np.arange(int(rate * seconds)) / rate
+    waits = random.exponential(random.uniform(5e-4, 5e-3), len(t))
+    clock = some_clock(random)
+    corrected = correct(
+        clock(t + waits), probes=clock.probes(random, t[-1]), rate_hz=rate, stamped="when_sent",
+        latency_s=float(waits.mean()),
+    )  # fmt: skip
+    assert np.mean(np.abs(corrected.time - t) <= corrected.error) >= 0.95
+    assert np.median(corrected.error) < 3.0 * np.quantile(waits, 0.975)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_computed_stamps_contradict_that_they_were_taken_at_sampling(seed: int) -> None:
+    random = np.random.default_rng([17, seed])
+    rate, size = float(random.choice([125.0, 250.0, 500.0])), int(random.integers(5, 25))
+    t = 1.0 + np.arange(size * 800) / rate
+    sent = np.maximum.accumulate(t[size - 1 :: size] + random.exponential(0.004, 800))
+    stamps = np.repeat(sent, size) - np.tile(np.arange(size)[::-1], 800) / rate
+    clock = some_clock(random)
+    given = {"probes": clock.probes(random, t[-1]), "rate_hz": rate}
+    found = [correct(clock(stamps), stamped=stamped, **given) for stamped in ("", "at_sampling")]
+    assert [corrected.quality.contradicted for corrected in found] == [0, 1]
+    np.testing.assert_array_equal(*(corrected.error for corrected in found))
+    words = [each.text for each in judge_quality(found[1].quality, rate, len(t), Limits())]
+    assert any("declaration was not used" in text for text in words)

@@ -38,7 +38,13 @@ from labcrane.streams.sync.quality import (
     worst_second,
 )
 from labcrane.streams.sync.raw import REMOTE, RTT, RawStream
-from labcrane.streams.sync.sampling import RATE_CHANGE, Sampling, examine, examine_irregular
+from labcrane.streams.sync.sampling import (
+    RATE_CHANGE,
+    Sampling,
+    Stamped,
+    examine,
+    examine_irregular,
+)
 from labcrane.streams.sync.stamping.shifts import MOST_S
 from labcrane.streams.sync.terms import Term, Terms, none_of, total, typical
 from labcrane.types import FloatArray
@@ -54,8 +60,8 @@ class Treatment:
         Nominal rate; 0 for irregular streams.
     can_drop_samples
         Whether the source may leave out samples, as cameras do.
-    pauses
-        Whether the sampler is declared to pause: stamps later from one sample on are then right.
+    stamped
+        When samples of a regular stream get their stamps, as far as that is declared.
     dejitter
         Whether timestamps are dejittered; markers never are, nor streams that may drop samples.
     transport_s
@@ -66,7 +72,7 @@ class Treatment:
 
     rate_hz: float = 0.0
     can_drop_samples: bool = False
-    pauses: bool = False
+    stamped: Stamped = Stamped.UNKNOWN
     dejitter: Dejitter = Dejitter.AUTO
     transport_s: float = 0.0
     latency_s: float = 0.0
@@ -89,6 +95,9 @@ NEARLY_ALL = 1.35
 
 STANDING = 20
 """So many stamps of markers that are all the same say nothing."""
+
+TWICE = 2.0
+"""A mean that is declared may be wrong for a while by so many times the change that is seen."""
 
 LONG_RUN = 400
 """So many samples between holes tell a steady clock of them."""
@@ -261,13 +270,17 @@ def _correct(raw: RawStream, treatment: Treatment, end: float | None) -> Correct
     time, terms = _evened(raw, placed, sampled, treatment)
     shift = treatment.transport_s + treatment.latency_s
     quality = _summed(raw, placed, sampled, (time, terms, end), regular=regular)
+    if regular and treatment.stamped:
+        at_sampling = treatment.stamped is Stamped.AT_SAMPLING
+        against = at_sampling and any(one.computed for _, one, _ in sampled)
+        quality = replace(quality, stamped=treatment.stamped.value, contradicted=int(against))
     return Corrected(time - shift, terms, placed.time - shift, placed.segments, quality)
 
 
 def _examined(raw: RawStream, placed: Placement, treatment: Treatment) -> list[_Sampled]:
     """Return how each clock's samples were sampled, and their even times where these help."""
     arrival, times = raw.arrival(), placed.time
-    regular, pauses = treatment.rate_hz > 0.0, treatment.pauses
+    regular, stamped = treatment.rate_hz > 0.0, treatment.stamped
     if placed.long_frozen:  # frozen timestamps do not show how samples were taken
         own = moving(raw.stamps)
         times = np.interp(np.arange(len(times)), own, times[own])
@@ -283,13 +296,16 @@ def _examined(raw: RawStream, placed: Placement, treatment: Treatment) -> list[_
             )
             probed = segment.basis is Basis.PROBES
             if regular:
-                sampling = examine(*seen, probed=probed, pauses=pauses)
+                sampling = examine(*seen, probed=probed, late=stamped is Stamped.WHEN_SENT)
             else:
                 sampling = examine_irregular(*seen)
+            if stamped is Stamped.AT_SAMPLING:
+                sampling = sampling.as_sampled()
             followed = None
             if sampling.steady:
                 followed = _followed(times[part], sampling)
-                sampling = sampling.judged_by(times[part] - followed[0])
+                moved = times[part] - followed[0]
+                sampling = sampling.judged_by(moved, late=stamped is Stamped.WHEN_SENT)
             found.append((segment, sampling, followed if sampling.steady else None))
     return found
 
@@ -337,8 +353,10 @@ def _evened(
             if sampling.unplaced or sampling.uncounted:
                 losses += sampling.noise_s / 2.0
             # A mean that is declared is that of the session, and none of a while.
-            known = (declared and sampling.received is None) or not sampling.late_stamps
-            stamps += max(sampling.shift_s, 0.0 if known else sampling.noise_s)
+            open_s = sampling.noise_s if sampling.late_stamps else 0.0
+            if declared and sampling.received is None:
+                open_s = min(open_s, TWICE * float(np.max(sampling.wander_s)))
+            stamps += max(sampling.shift_s, open_s)
         elif way in {Dejitter.LEAST_SQUARES, Dejitter.ENVELOPE}:
             index = sampling.index if raw.index is None else raw.index[part]
             time[part] = even(placed.time[part], index, way)

@@ -91,6 +91,8 @@ class Quality:
         Unit that stamps are cut or rounded to; 0 where they are not.
     late_stamps
         1 where chunks are stamped when they are sent.
+    stamped, contradicted
+        When samples are stamped, as far as that is declared; 1 where stamps contradict it.
     shifts, shift_s
         How often stamps are later, or sooner, from one sample on, by the largest shift.
     strayed
@@ -148,6 +150,8 @@ class Quality:
     uneven_s: float = 0.0
     grid_s: float = 0.0
     late_stamps: int = 0
+    stamped: str = ""
+    contradicted: int = 0
     shifts: int = 0
     shift_s: float = 0.0
     strayed: int = 0

@@ -5,6 +5,7 @@ or because they were stamped so.
 """
 
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 
 import numpy as np
 import numpy.typing as npt
@@ -57,6 +58,14 @@ STALL_S = 0.75
 SEVERAL = 3
 
 
+class Stamped(StrEnum):
+    """When samples get their timestamps, as far as that is declared."""
+
+    UNKNOWN = ""
+    AT_SAMPLING = "at_sampling"  # the timestamps are the samples' own times
+    WHEN_SENT = "when_sent"  # each is late by a wait that changes
+
+
 @dataclass(frozen=True, slots=True)
 class Sampling:
     """How a regular stream was sampled and stamped. Times are seconds.
@@ -86,6 +95,8 @@ class Sampling:
         Whether evening helps: the scatter is the stamps', and the sample clock is steady.
     uncounted
         Whether stamps scatter by so much that single lost samples cannot be counted.
+    computed
+        Whether stamps within chunks are computed, or closer than samples can be.
     unplaced
         Whether samples may be missing among those stamped late, and nothing tells where.
     received
@@ -137,6 +148,7 @@ class Sampling:
     late_stamps: bool = False
     steady: bool = False
     uncounted: bool = False
+    computed: bool = False
     unplaced: bool = False
     received: receipt.Receipt | None = None
     shifted: shifts.Shifts | None = None
@@ -160,7 +172,31 @@ class Sampling:
         """Samples per second, while they flowed."""
         return 1.0 / self.period
 
-    def judged_by(self, moved: FloatArray) -> "Sampling":
+    def as_sampled(self) -> "Sampling":
+        """Return it with stamps that are declared to be the samples' own times.
+
+        A step to later is a pause then, and what scatters are the samples. Of a step back, one of
+        both sides is wrong all the same. Computed stamps contradict the declaration.
+        """
+        if self.computed:
+            return self
+        return replace(
+            self,
+            noise_s=0.0,
+            late_stamps=False,
+            steady=False,
+            unplaced=False,
+            received=None,
+            shifted=None if self.shifted is None else self.shifted.without_pauses(),
+            uneven_s=0.0,
+            unsure_s=0.0,
+            slip_s=0.0,
+            shift_s=0.0,
+            chunk_s=0.0,
+            wander_s=0.0,
+        )
+
+    def judged_by(self, moved: FloatArray, *, late: bool = False) -> "Sampling":
         """Return it as steady only if evening moved samples as far as stamping noise scatters.
 
         Noise is new in each stamp, so that a few neighbours show all of it. What adds up beyond
@@ -171,6 +207,8 @@ class Sampling:
         ----------
         moved
             By how much, in seconds, shape ``(n,)``.
+        late
+            Whether all of it is declared to be noise.
         """
         if self.received is not None:
             return self
@@ -178,6 +216,8 @@ class Sampling:
         allowed = WITHIN * self.grid_s if by_grid else self.reach_s
         if float(np.quantile(np.abs(moved), 0.95)) <= allowed:
             return self
+        if late:
+            return replace(self, steady=False)
         kept = min(self.noise_s, self.reach_s)
         return replace(
             self, noise_s=0.0, kept_s=kept, late_stamps=False, steady=False, unplaced=False
@@ -191,7 +231,7 @@ def examine(
     counter: FloatArray | None,
     *,
     probed: bool = True,
-    pauses: bool = False,
+    late: bool = False,
 ) -> Sampling:
     """Examine one clock's samples of a regular stream.
 
@@ -207,8 +247,8 @@ def examine(
         The source's own, unwrapped; None when it has none.
     probed
         Whether times rest on probes; those by arrivals scatter for another reason.
-    pauses
-        Whether the sampler is declared to pause.
+    late
+        Whether stamps are declared to be late by waits that change.
     """
     index = np.arange(len(time), dtype=np.float64) if counter is None else counter
     stalls, longest = _stalls(time, arrival)
@@ -221,11 +261,9 @@ def examine(
     grid = coarse_unit(stamps, regular=True)
     if disordered:
         counts = index if counter is None else counter[order]  # who has none counts as they stand
-        found = _steps(time[order], counts, grid, counted=counter is not None, pauses=pauses)
+        found = _steps(time[order], counts, grid, counted=counter is not None)
     else:
-        found = _steps(time, index, grid, counted=counter is not None, pauses=pauses)
-    if pauses:
-        found = replace(found, shifted=found.shifted.without_pauses())
+        found = _steps(time, index, grid, counted=counter is not None)
     grid = 0.0 if _on_grid(found, stamps[order], grid) else grid
     shifted = found.exact and len(found.shifted.at) > 0
     lost, blurred = None, False
@@ -256,12 +294,13 @@ def examine(
                 index=index,
                 unsure_s=0.0 if lost is None else lost.unsure * waited.period,
                 uncounted=blurred and lost is None,
+                computed=found.computed,
                 shift_s=receipt.open_shift(flowed, index),
                 breaks=found.breaks[: 0 if counter is None else None],
                 chunk_s=found.chunk_s,
                 wander_s=found.moves(stamps, waited.period, index).open_s,
             )
-    noise, late, by_grid, uneven = _noise(time, arrival, found, grid)
+    noise, late, by_grid, uneven = _noise(time, arrival, found, grid, late=late)
     rates = _rates(found)
     steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
     moves = None
@@ -281,6 +320,7 @@ def examine(
         late_stamps=late,
         steady=steady,
         uncounted=blurred and lost is None,
+        computed=found.computed,
         unplaced=unplaced,
         shifted=found.shifted,
         stalls=stalls,
@@ -376,9 +416,7 @@ class _Steps:
         return int(np.count_nonzero(passing_s > max(self.stray_s, usual)))
 
 
-def _steps(
-    time: FloatArray, index: FloatArray, grid: float, *, counted: bool, pauses: bool
-) -> _Steps:
+def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -> _Steps:
     steps, counts = np.diff(time), np.maximum(np.diff(index), 1.0)
     local = _local(steps / counts)
     typical = _typical(time, index)
@@ -415,7 +453,7 @@ def _steps(
     flowed = time - np.r_[0.0, np.cumsum(beyond - back)]
     moved = np.zeros(len(steps))
     moved[shifted.at - 1] = shifted.by_s
-    long = (beyond + (whole - counts) * local >= wander.MOST_S) | pauses
+    long = beyond + (whole - counts) * local >= wander.MOST_S
     unpaused = time - np.r_[0.0, np.cumsum(np.where(long & (moved == 0.0), beyond, moved))]
     mean, usual = slope(position, flowed), float(np.median(local))
     if computed and not clumped and not counted:
@@ -536,15 +574,15 @@ def _rates(found: _Steps) -> tuple[float, ...]:
 
 
 def _noise(
-    time: FloatArray, arrival: FloatArray | None, found: _Steps, grid: float
+    time: FloatArray, arrival: FloatArray | None, found: _Steps, grid: float, *, late: bool
 ) -> tuple[float, bool, bool, float]:
     """Return by how much the stamps scatter that were not taken so, and why.
 
     The second is whether they are late, the third whether only their grid lets them scatter, the
     last by how much those scatter that were taken so, for all that is known.
 
-    Stamps that are computed, of a coarse clock, or unlike the arrivals of their samples were not
-    taken when the samples were.
+    Stamps that are declared to be late, computed, of a coarse clock, or unlike the arrivals of
+    their samples were not taken when the samples were.
     """
     rest = found.flowed - found.period * (found.index - found.index[0])
     size = max(len(rest) // BLOCKS, 50)
@@ -555,9 +593,9 @@ def _noise(
     level = np.interp(np.arange(len(rest)), middle, medians)
     apart = np.abs(rest - level)
     spread = float(np.quantile(apart, 0.95))
-    if found.computed:
-        late = float(np.quantile(apart, 0.975)) + abs(float(np.mean(rest - level)))
-        return late, True, False, 0.0
+    if found.computed or late:
+        waits = float(np.quantile(apart, 0.975)) + abs(float(np.mean(rest - level)))
+        return waits, True, False, 0.0
     if grid and spread <= WITHIN * grid:
         return 0.0, False, True, 0.0
     if spread < max(LEAST_NOISE_S, 0.005 * found.period):
