@@ -16,7 +16,6 @@ from labcrane import (
     Feedback,
     FloatArray,
     Frame,
-    Machine,
     Offer,
     Run,
     Settings,
@@ -108,7 +107,4 @@ class Lamp(Feedback):
 
 @hookimpl
 def labcrane_feedback() -> list[Offer[Feedback]]:
-    def build(settings: LampSettings, machine: Machine) -> Feedback:
-        return Lamp(settings)
-
-    return [offer("lamp", LampSettings, build)]
+    return [offer("lamp", LampSettings, Lamp)]

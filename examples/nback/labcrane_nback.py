@@ -146,7 +146,4 @@ class Nback(SecondaryTask):
 
 @hookimpl
 def labcrane_secondary() -> list[Offer[SecondaryTask]]:
-    def build(settings: NbackSettings, machine: Machine) -> SecondaryTask:
-        return Nback(settings)
-
-    return [offer("nback", NbackSettings, build)]
+    return [offer("nback", NbackSettings, Nback)]

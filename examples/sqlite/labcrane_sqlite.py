@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from contextlib import closing
 from pathlib import Path
 
-from labcrane import Machine, Offer, Settings, hookimpl, offer
+from labcrane import Offer, Settings, hookimpl, offer
 from labcrane.analysis import Exporter, Participant
 
 labcrane_api = 1
@@ -73,7 +73,4 @@ def _append(database: sqlite3.Connection, name: str, table) -> None:
 
 @hookimpl
 def labcrane_exporters() -> list[Offer[Exporter]]:
-    def build(settings: SqliteSettings, machine: Machine) -> Exporter:
-        return Sqlite(settings)
-
-    return [offer("sqlite", SqliteSettings, build)]
+    return [offer("sqlite", SqliteSettings, Sqlite)]

@@ -249,4 +249,4 @@ def _module(function: Callable[..., object]) -> Path | None:
 
 def _source(function: Callable[..., object]) -> str:
     code = getattr(inspect.unwrap(function), "__code__", None)
-    return f"{code.co_filename}:{code.co_firstlineno}" if code else "no source"
+    return f"{code.co_filename}:{code.co_firstlineno}" if code else str(function)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from importlib.util import find_spec
+from inspect import Parameter, signature
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from labcrane.core.roles import Component
@@ -76,11 +78,37 @@ def _is_there(module: str) -> bool:
     return find_spec(module) is not None
 
 
+@dataclass(frozen=True, slots=True)
+class Maker:
+    """Calls a class, or what a place names, with the arguments that it has no default for.
+
+    Attributes
+    ----------
+    made
+        The class, or module and name of what is imported when it is called.
+    """
+
+    made: type[Any] | str
+
+    def __call__(self, *given: object) -> Any:
+        """Call it with settings, and what else it needs of the arguments."""
+        made: Callable[..., Any]
+        if isinstance(self.made, str):
+            module, _, name = self.made.partition(":")
+            made = getattr(import_module(module), name)
+        else:
+            made = self.made
+        needed = [
+            each for each in signature(made).parameters.values() if each.default is Parameter.empty
+        ]
+        return made(*given[: len(needed)])
+
+
 def offer(
     name: str,
     settings: type[SettingsT],
-    build: Callable[[SettingsT, Machine], RoleT],
-    examine: Callable[[SettingsT, Prompt | None], Sequence[Finding]] | None = None,
+    build: Callable[[SettingsT, Machine], RoleT] | type[RoleT] | str,
+    examine: Callable[[SettingsT, Prompt | None], Sequence[Finding]] | str | None = None,
     *,
     needs: Mapping[str, str] | None = None,
 ) -> Offer[RoleT]:
@@ -93,12 +121,15 @@ def offer(
     settings
         Model of the keys that a protocol may write next to ``use``.
     build
-        Called with validated settings and the machine, once per run. Import heavy libraries
-        inside it: every installed plugin is imported just to list offers.
+        Called with validated settings and the machine, once per run: a function, or the class
+        itself, which is given the machine if it asks for it. Every installed plugin is imported
+        just to list offers, so one with heavy libraries names the place of its class, as
+        ``"labcrane_view.view:View"``, which is imported when it is built.
     examine
         Called by ``labcrane doctor`` with validated settings, in a process of its own, and given
         30 seconds: returns the state of the hardware that the component needs. Its second argument
-        shows the person at the machine what to do; None when there is no person.
+        shows the person at the machine what to do; None when there is no person. It may be a place
+        as well: ``"labcrane_view.examination:examine"``.
     needs
         Modules that a smaller installation may lack, and how to get each:
         ``{"pyserial": "pip install 'my-lamp[serial]'"}``. Checking a protocol says so, and nothing
@@ -109,7 +140,12 @@ def offer(
     Offer
         To be returned from a hook.
     """
-    return Offer(name, settings, build, examine, needs or {})
+    looks = None if examine is None else _callable(examine)
+    return Offer(name, settings, _callable(build), looks, needs or {})
+
+
+def _callable(given: Callable[..., Any] | str) -> Callable[..., Any]:
+    return Maker(given) if isinstance(given, str | type) else given
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,12 +1,9 @@
 """A new plugin: a folder that installs, passes its contract tests, and can be changed."""
 
-import inspect
 import keyword
 import re
 from pathlib import Path
 
-import labcrane
-from labcrane.core.roles import Component
 from labcrane.errors import PluginError, suggestion
 from labcrane.files.atomic import SHARED_FILE, write_text
 from labcrane.registry.commands import plugin_commands
@@ -14,8 +11,8 @@ from labcrane.registry.hookspecs import ROLES, RoleEntry, role_called
 from labcrane.registry.registry import Registry
 
 TEMPLATES = Path(__file__).parent / "templates"
-ANY, BARE = "any", "bare"
-"""The folders of what every plugin needs, beside one for each role, and of a role without one."""
+ANY = "any"
+"""The folder of what every plugin needs, beside one for each role."""
 
 COMMAND = "command"
 """Another kind of plugin, which fills no role."""
@@ -73,11 +70,10 @@ def _kind(name: str) -> str:
 def _templates(kind: str) -> dict[str, str]:
     """Return the files of a new plugin, with what is to be filled in, by name."""
     role = role_called(kind)
-    own = TEMPLATES / kind
     found = {
-        path.name.removesuffix(".in"): path.read_text(encoding="utf-8")
-        for folder in (TEMPLATES / ANY, own if own.exists() else TEMPLATES / BARE)
-        for path in sorted(folder.iterdir())
+        path.name: path.read_text(encoding="utf-8")
+        for folder in (ANY, kind)
+        for path in sorted((TEMPLATES / folder).iterdir())
         if path.is_file()
     }
     if role is None:
@@ -86,8 +82,6 @@ def _templates(kind: str) -> dict[str, str]:
         found["protocol.yaml"] = _using(ROLES[role], found["protocol.yaml"])
         if kind in PRESENTED:
             found["README.md"] = found["README.md"].replace("--simulate", "--simulate --feedback")
-        if not own.exists():
-            found["my_module.py"] = _bare(role, found["my_module.py"])
     return found
 
 
@@ -111,39 +105,6 @@ def _using(entry: RoleEntry, protocol: str) -> str:
         f"      - {entry.step}: my_part\n" if entry.step else ""
     )
     return protocol if written else protocol.replace(used, f"{used}sessions:\n", 1)
-
-
-def _bare(role: type[Component], module: str) -> str:
-    """Return a module with every method that a component of a role must have, to be written."""
-    methods = []
-    for name in sorted(role.__abstractmethods__):
-        function = getattr(role, name)
-        methods.append(
-            f"    def {name}{inspect.signature(function)}:\n"
-            f'        """{(inspect.getdoc(function) or name).splitlines()[0]}"""\n'
-            f"        raise NotImplementedError\n"
-        )
-    text = "\n".join(methods).replace("'", "") or "    pass\n"
-    words = {role.__name__, *re.findall(r"\w+", text)}
-    public = {"Machine", "Offer", "Settings", "hookimpl", "offer"} | words & set(labcrane.__all__)
-    abstract = ", ".join(sorted(words & {"Iterable", "Mapping", "Sequence"}))
-    standard = f"from collections.abc import {abstract}\n" if abstract else ""
-    standard += "from pathlib import Path\n" if "Path" in words else ""
-    standard += "\n" if standard else ""
-    imports = "".join(f"    {word},\n" for word in sorted(public, key=_as_sorted_by_ruff))
-    for placeholder, filled in (
-        ("a_standard_import\n", standard),
-        ("    a_method", text.rstrip("\n")),
-        ("    an_import,\n", imports),
-        ("ARole", role.__name__),
-        ("a_hook", ROLES[role].hook.__name__),
-    ):
-        module = module.replace(placeholder, filled)
-    return module
-
-
-def _as_sorted_by_ruff(word: str) -> tuple[int, str]:
-    return (0 if word.isupper() else 1 if word[0].isupper() else 2), word
 
 
 def _check_name(kind: str, name: str, registry: Registry) -> None:

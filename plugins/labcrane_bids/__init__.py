@@ -1,8 +1,6 @@
 """Export of recordings as a BIDS 1.11 data set: motion, events, eye tracking."""
 
-from collections.abc import Sequence
-
-from labcrane import Machine, Offer, hookimpl, offer
+from labcrane import Offer, hookimpl, offer
 from labcrane.analysis import Exporter
 from labcrane_bids.settings import BidsSettings
 
@@ -10,10 +8,5 @@ labcrane_api = 1
 
 
 @hookimpl
-def labcrane_exporters() -> Sequence[Offer[Exporter]]:
-    def bids(settings: BidsSettings, machine: Machine) -> Exporter:
-        from labcrane_bids.bids import Bids
-
-        return Bids(settings, machine)
-
-    return (offer("bids", BidsSettings, bids),)
+def labcrane_exporters() -> list[Offer[Exporter]]:
+    return [offer("bids", BidsSettings, "labcrane_bids.bids:Bids")]

@@ -14,9 +14,10 @@ ENGINE = (
 
 @hookimpl
 def labcrane_dynamics() -> list[Offer[Dynamics]]:
+    kinematic = "labcrane_bullet.kinematic_crane:KinematicCrane"
     return [
         offer("bullet_crane", LoadedCraneSettings, _bullet_crane, needs={"pybullet": ENGINE}),
-        offer("kinematic_crane", CraneSettings, _kinematic_crane),
+        offer("kinematic_crane", CraneSettings, kinematic),
     ]
 
 
@@ -25,9 +26,3 @@ def _bullet_crane(settings: LoadedCraneSettings, machine: Machine) -> Dynamics:
     from labcrane_bullet.loaded_crane import LoadedBulletCrane
 
     return (LoadedBulletCrane if settings.loaded else BulletCrane)(settings, machine)
-
-
-def _kinematic_crane(settings: CraneSettings, machine: Machine) -> Dynamics:
-    from labcrane_bullet.kinematic_crane import KinematicCrane
-
-    return KinematicCrane(settings, machine)

@@ -1,10 +1,7 @@
 """Control panels on a CAN bus: J1939 auxiliary valve commands, or whatever a DBC file describes."""
 
-from collections.abc import Sequence
-
-from labcrane import InputDevice, Machine, Offer, hookimpl, offer
-from labcrane.core import Finding
-from labcrane.registry import LAB, CommandOffer, Prompt
+from labcrane import InputDevice, Offer, hookimpl, offer
+from labcrane.registry import LAB, CommandOffer
 from labcrane_can.settings import CanSettings
 
 labcrane_api = 1
@@ -12,16 +9,7 @@ labcrane_api = 1
 
 @hookimpl
 def labcrane_inputs() -> list[Offer[InputDevice]]:
-    def panel(settings: CanSettings, machine: Machine) -> InputDevice:
-        from labcrane_can.panel import CanPanel
-
-        return CanPanel(settings, machine)
-
-    def examine(settings: CanSettings, ask: Prompt | None) -> Sequence[Finding]:
-        from labcrane_can import examination
-
-        return examination.examine(settings, ask)
-
+    panel, examine = "labcrane_can.panel:CanPanel", "labcrane_can.examination:examine"
     needs = {"can": LAB, "cantools": LAB}
     return [offer("can", CanSettings, panel, examine, needs=needs)]
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from labcrane import Controller, Dynamics, Machine, Offer, hookimpl, offer
+from labcrane import Controller, Dynamics, Offer, hookimpl, offer
 from labcrane.registry import LAB, CommandOffer
 from labcrane_dmd.arm.settings import ArmSettings, ValveSettings
 
@@ -36,19 +36,10 @@ def labcrane_commands() -> list[CommandOffer]:
 
 @hookimpl
 def labcrane_controllers() -> list[Offer[Controller]]:
-    def valve(settings: ValveSettings, machine: Machine) -> Controller:
-        from labcrane_dmd.arm.valve import Valve
-
-        return Valve(settings, machine)
-
-    return [offer("valve", ValveSettings, valve)]
+    return [offer("valve", ValveSettings, "labcrane_dmd.arm.valve:Valve")]
 
 
 @hookimpl
 def labcrane_dynamics() -> list[Offer[Dynamics]]:
-    def arm(settings: ArmSettings, machine: Machine) -> Dynamics:
-        from labcrane_dmd.arm.arm import DmdArm
-
-        return DmdArm(settings, machine)
-
+    arm = "labcrane_dmd.arm.arm:DmdArm"
     return [offer("dmd_arm", ArmSettings, arm, needs={"pybullet": ENGINE})]

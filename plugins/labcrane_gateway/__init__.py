@@ -1,6 +1,6 @@
 """The open gateway protocol: any program with LSL can be the control station."""
 
-from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from labcrane import InputDevice, Offer, hookimpl, offer
 from labcrane.registry import LAB
 from labcrane_gateway.settings import GatewaySettings
 
@@ -9,9 +9,5 @@ labcrane_api = 1
 
 @hookimpl
 def labcrane_inputs() -> list[Offer[InputDevice]]:
-    def gateway(settings: GatewaySettings, machine: Machine) -> InputDevice:
-        from labcrane_gateway.station import Station
-
-        return Station(settings, machine)
-
-    return [offer("gateway", GatewaySettings, gateway, needs={"pylsl": LAB})]
+    station = "labcrane_gateway.station:Station"
+    return [offer("gateway", GatewaySettings, station, needs={"pylsl": LAB})]

@@ -1,8 +1,6 @@
 """Export of recordings as MAT files, version 5, which MATLAB and Octave load."""
 
-from collections.abc import Sequence
-
-from labcrane import Machine, Offer, hookimpl, offer
+from labcrane import Offer, hookimpl, offer
 from labcrane.analysis import Exporter
 from labcrane_matlab.settings import MatlabSettings
 
@@ -10,10 +8,5 @@ labcrane_api = 1
 
 
 @hookimpl
-def labcrane_exporters() -> Sequence[Offer[Exporter]]:
-    def matlab(settings: MatlabSettings, machine: Machine) -> Exporter:
-        from labcrane_matlab.matlab import Matlab
-
-        return Matlab(settings)
-
-    return (offer("matlab", MatlabSettings, matlab),)
+def labcrane_exporters() -> list[Offer[Exporter]]:
+    return [offer("matlab", MatlabSettings, "labcrane_matlab.matlab:Matlab")]

@@ -20,44 +20,26 @@ labcrane_api = 1
 
 @hookimpl
 def labcrane_questionnaires() -> list[Offer[Questionnaire]]:
-    def tlx(settings: TlxSettings, machine: Machine) -> Questionnaire:
-        from labcrane_questionnaires.tlx import NasaTlx
-
-        return NasaTlx(settings)
-
-    def sus(settings: SusSettings, machine: Machine) -> Questionnaire:
-        from labcrane_questionnaires.sus import Sus
-
-        return Sus(settings)
-
-    def rating(name: str) -> Offer[Questionnaire]:
-        def build(settings: RatingSettings, machine: Machine) -> Questionnaire:
-            from labcrane_questionnaires.rating import Rating
-
-            return Rating(name, settings)
-
-        return offer(name, RatingSettings, build)
-
-    def demographics(settings: DemographicsSettings, machine: Machine) -> Questionnaire:
-        from labcrane_questionnaires.demographics import Demographics
-
-        return Demographics(settings)
-
-    def free(settings: FreeSettings, machine: Machine) -> Questionnaire:
-        from labcrane_questionnaires.free import Free
-
-        return Free(settings)
-
+    about_you = "labcrane_questionnaires.demographics:Demographics"
     return [
-        offer("nasa_tlx", TlxSettings, tlx),
-        offer("sus", SusSettings, sus),
-        rating("subjective_accuracy"),
-        rating("situational_awareness"),
-        offer("demographics", DemographicsSettings, demographics),
-        offer("free", FreeSettings, free),
+        offer("nasa_tlx", TlxSettings, "labcrane_questionnaires.tlx:NasaTlx"),
+        offer("sus", SusSettings, "labcrane_questionnaires.sus:Sus"),
+        _rating("subjective_accuracy"),
+        _rating("situational_awareness"),
+        offer("demographics", DemographicsSettings, about_you),
+        offer("free", FreeSettings, "labcrane_questionnaires.free:Free"),
         _from_the_lab("sart", LabTextSettings),
         *(_from_the_lab(name, WordedSettings) for name in ("ssq", "borg_cr10", "borg_rpe", "kss")),
     ]
+
+
+def _rating(name: str) -> Offer[Questionnaire]:
+    def build(settings: RatingSettings, machine: Machine) -> Questionnaire:
+        from labcrane_questionnaires.rating import Rating
+
+        return Rating(name, settings)
+
+    return offer(name, RatingSettings, build)
 
 
 def _from_the_lab(name: str, settings: type[LabTextSettings]) -> Offer[Questionnaire]:

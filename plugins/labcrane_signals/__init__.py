@@ -20,10 +20,10 @@ def labcrane_monitors() -> list[Offer[SignalMonitor]]:
         offer("eeg_signal", EegSettings, _eeg),
         offer("ecg_signal", EcgSettings, _ecg),
         offer("emg_signal", EmgSettings, _emg),
-        offer("gaze_signal", GazeSettings, _gaze),
-        offer("force_signal", ForceSettings, _force),
-        offer("stick_signal", StickSettings, _sticks),
-        offer("any_signal", AnySettings, _any),
+        offer("gaze_signal", GazeSettings, "labcrane_signals.gaze:GazeMonitor"),
+        offer("force_signal", ForceSettings, "labcrane_signals.plain:ForceMonitor"),
+        offer("stick_signal", StickSettings, "labcrane_signals.sticks:StickMonitor"),
+        offer("any_signal", AnySettings, "labcrane_signals.plain:PlainMonitor"),
     ]
 
 
@@ -43,27 +43,3 @@ def _emg(settings: EmgSettings, machine: Machine) -> SignalMonitor:
     from labcrane_signals.electrodes import EMG, ElectrodeMonitor
 
     return ElectrodeMonitor(settings, EMG)
-
-
-def _gaze(settings: GazeSettings, machine: Machine) -> SignalMonitor:
-    from labcrane_signals.gaze import GazeMonitor
-
-    return GazeMonitor(settings)
-
-
-def _force(settings: ForceSettings, machine: Machine) -> SignalMonitor:
-    from labcrane_signals.plain import ForceMonitor
-
-    return ForceMonitor(settings)
-
-
-def _sticks(settings: StickSettings, machine: Machine) -> SignalMonitor:
-    from labcrane_signals.sticks import StickMonitor
-
-    return StickMonitor(settings)
-
-
-def _any(settings: AnySettings, machine: Machine) -> SignalMonitor:
-    from labcrane_signals.plain import PlainMonitor
-
-    return PlainMonitor()

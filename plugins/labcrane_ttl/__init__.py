@@ -20,13 +20,8 @@ def labcrane_triggers() -> list[Offer[Trigger]]:
 
         return SerialTrigger(settings, settings.written, rest=settings.rest.encode())
 
-    def parallel_ttl(settings: ParallelSettings, machine: Machine) -> Trigger:
-        from labcrane_ttl.parallel_port import ParallelTrigger
-
-        return ParallelTrigger(settings)
-
     return [
         offer("serial_ttl", SerialSettings, serial_ttl, needs=SERIAL),
         offer("box_ttl", BoxSettings, box_ttl, needs=SERIAL),
-        offer("parallel_ttl", ParallelSettings, parallel_ttl),
+        offer("parallel_ttl", ParallelSettings, "labcrane_ttl.parallel_port:ParallelTrigger"),
     ]

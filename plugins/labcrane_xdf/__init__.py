@@ -1,8 +1,6 @@
 """Export of sessions as XDF: all streams in one file, on one clock."""
 
-from collections.abc import Sequence
-
-from labcrane import Machine, Offer, Settings, hookimpl, offer
+from labcrane import Offer, Settings, hookimpl, offer
 from labcrane.analysis import Exporter
 
 labcrane_api = 1
@@ -13,10 +11,5 @@ class XdfSettings(Settings):
 
 
 @hookimpl
-def labcrane_exporters() -> Sequence[Offer[Exporter]]:
-    def xdf(settings: XdfSettings, machine: Machine) -> Exporter:
-        from labcrane_xdf.merged import MergedXdf
-
-        return MergedXdf()
-
-    return (offer("xdf", XdfSettings, xdf),)
+def labcrane_exporters() -> list[Offer[Exporter]]:
+    return [offer("xdf", XdfSettings, "labcrane_xdf.merged:MergedXdf")]

@@ -47,7 +47,7 @@ class Plain(Feedback):
 
 @hookimpl
 def labcrane_feedback():
-    return [offer("plain", PlainSettings, lambda settings, machine: Plain())]
+    return [offer("plain", PlainSettings, Plain)]
 '''
 
 STUDY = (

@@ -73,7 +73,7 @@ class Raising(Feedback):
 
 @hookimpl
 def labcrane_feedback():
-    return [offer("raising", RaisingSettings, lambda settings, machine: Raising(settings))]
+    return [offer("raising", RaisingSettings, Raising)]
 '''
 
 

@@ -63,7 +63,7 @@ class Slow(Feedback):
 
 @hookimpl
 def labcrane_feedback():
-    return [offer("slow", SlowSettings, lambda settings, machine: Slow(settings))]
+    return [offer("slow", SlowSettings, Slow)]
 '''
 
 

@@ -59,7 +59,7 @@ class Clumsy(Feedback):
 
 @hookimpl
 def labcrane_feedback():
-    return [offer("clumsy", ClumsySettings, lambda settings, machine: Clumsy(settings))]
+    return [offer("clumsy", ClumsySettings, Clumsy)]
 '''
 
 

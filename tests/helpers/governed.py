@@ -32,10 +32,7 @@ class StandInSettings(OperatorSettings):
 
 @hookimpl
 def labcrane_inputs():
-    def build(settings, machine):
-        return SimulatedOperator(settings)
-
-    return [offer("stand_in", StandInSettings, build)]
+    return [offer("stand_in", StandInSettings, SimulatedOperator)]
 """
 
 GOVERNED = SHORT.replace("{use: dual_joystick}", PERSON).replace(

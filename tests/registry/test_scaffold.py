@@ -29,7 +29,7 @@ def environment(projects: dict[str, Path], tmp_path_factory: pytest.TempPathFact
 
 
 def test_there_is_a_template_for_every_role() -> None:
-    assert {path.name for path in TEMPLATES.iterdir()} - {"any", "bare"} == set(kinds())
+    assert {path.name for path in TEMPLATES.iterdir()} - {"any"} == set(kinds())
     assert {entry.word for entry in ROLES.values()} | {"command"} == set(kinds())
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
-from labcrane import Capture, DeviceError, Machine, Offer, hookimpl, offer
+from labcrane import Capture, DeviceError, Offer, hookimpl, offer
 from labcrane.core import Captured, CaptureSettings
 
 labcrane_api = 1
@@ -69,7 +69,4 @@ class MyPart(Capture):
 
 @hookimpl
 def labcrane_captures() -> list[Offer[Capture]]:
-    def build(settings: MyPartSettings, machine: Machine) -> Capture:
-        return MyPart(settings)
-
-    return [offer("my_part", MyPartSettings, build)]
+    return [offer("my_part", MyPartSettings, MyPart)]

@@ -1,20 +1,12 @@
 """my_part keeps the contract of its role; add what else it promises."""
 
 from pathlib import Path
-from types import ModuleType
 
-import my_module
 import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import Capture
-from labcrane.testing import CaptureContract, PluginContract
-
-
-class TestPlugin(PluginContract):
-    @pytest.fixture
-    def plugin(self) -> ModuleType:
-        return my_module
+from labcrane.testing import CaptureContract
 
 
 class TestMyPart(CaptureContract):

@@ -11,9 +11,7 @@ from labcrane.registry import CommandOffer
 labcrane_api = 1
 
 
-def count(
-    data: Annotated[Path, typer.Argument(help="a study's data folder")],
-) -> None:
+def count(data: Annotated[Path, typer.Argument(help="a study's data folder")]) -> None:
     """Count the trials of every participant."""
     # What takes long to import is imported here, so that labcrane --help stays instant.
     from labcrane import open_recording

@@ -1,20 +1,12 @@
 """my_part keeps the contract of commands; add what else it promises."""
 
 from pathlib import Path
-from types import ModuleType
 
-import my_module
 import pytest
 from my_module import count, labcrane_commands
 
 from labcrane.registry import CommandOffer
-from labcrane.testing import PARTICIPANT_TRIALS, CommandContract, PluginContract, make_participant
-
-
-class TestPlugin(PluginContract):
-    @pytest.fixture
-    def plugin(self) -> ModuleType:
-        return my_module
+from labcrane.testing import PARTICIPANT_TRIALS, CommandContract, make_participant
 
 
 class TestCount(CommandContract):

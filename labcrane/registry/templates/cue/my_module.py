@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, PositiveFloat
 
-from labcrane import Cue, FloatArray, Frame, Machine, Offer, Run, Settings, Signal, hookimpl, offer
+from labcrane import Cue, FloatArray, Frame, Offer, Run, Settings, Signal, hookimpl, offer
 from labcrane.core import Cylinder, Shape
 
 labcrane_api = 1
@@ -58,7 +58,4 @@ class MyPart(Cue):
 
 @hookimpl
 def labcrane_cues() -> list[Offer[Cue]]:
-    def build(settings: MyPartSettings, machine: Machine) -> Cue:
-        return MyPart(settings)
-
-    return [offer("my_part", MyPartSettings, build)]
+    return [offer("my_part", MyPartSettings, MyPart)]

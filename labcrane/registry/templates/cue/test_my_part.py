@@ -1,29 +1,13 @@
 """my_part keeps the contract of its role; add what else it promises."""
 
 import math
-from types import ModuleType
 
-import my_module
 import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import Cue
 from labcrane.core import Cylinder
-from labcrane.testing import (
-    TARGETS,
-    CueContract,
-    PluginContract,
-    ch8,
-    make_run,
-    make_target,
-    opened,
-)
-
-
-class TestPlugin(PluginContract):
-    @pytest.fixture
-    def plugin(self) -> ModuleType:
-        return my_module
+from labcrane.testing import TARGETS, CueContract, ch8, make_run, make_target, opened
 
 
 class TestMyPart(CueContract):

@@ -65,7 +65,4 @@ class MyPart(Dynamics):
 
 @hookimpl
 def labcrane_dynamics() -> list[Offer[Dynamics]]:
-    def build(settings: MyPartSettings, machine: Machine) -> Dynamics:
-        return MyPart(settings, machine)
-
-    return [offer("my_part", MyPartSettings, build)]
+    return [offer("my_part", MyPartSettings, MyPart)]

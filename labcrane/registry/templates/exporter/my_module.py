@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from labcrane import Machine, Offer, Settings, hookimpl, offer
+from labcrane import Offer, Settings, hookimpl, offer
 from labcrane.analysis import Exporter, Participant
 
 labcrane_api = 1
@@ -34,7 +34,4 @@ class MyPart(Exporter):
 
 @hookimpl
 def labcrane_exporters() -> list[Offer[Exporter]]:
-    def build(settings: MyPartSettings, machine: Machine) -> Exporter:
-        return MyPart(settings)
-
-    return [offer("my_part", MyPartSettings, build)]
+    return [offer("my_part", MyPartSettings, MyPart)]

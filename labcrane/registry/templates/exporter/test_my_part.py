@@ -2,20 +2,12 @@
 
 import csv
 from pathlib import Path
-from types import ModuleType
 
-import my_module
 import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane.analysis import Exporter
-from labcrane.testing import PARTICIPANT_TRIALS, ExporterContract, PluginContract, make_participant
-
-
-class TestPlugin(PluginContract):
-    @pytest.fixture
-    def plugin(self) -> ModuleType:
-        return my_module
+from labcrane.testing import PARTICIPANT_TRIALS, ExporterContract, make_participant
 
 
 class TestMyPart(ExporterContract):

@@ -5,18 +5,7 @@ import math
 import numpy as np
 from pydantic import PositiveFloat
 
-from labcrane import (
-    Feedback,
-    FloatArray,
-    Frame,
-    Machine,
-    Offer,
-    Run,
-    Settings,
-    Signal,
-    hookimpl,
-    offer,
-)
+from labcrane import Feedback, FloatArray, Frame, Offer, Run, Settings, Signal, hookimpl, offer
 from labcrane.core import Within
 
 labcrane_api = 1
@@ -68,7 +57,4 @@ class MyPart(Feedback):
 
 @hookimpl
 def labcrane_feedback() -> list[Offer[Feedback]]:
-    def build(settings: MyPartSettings, machine: Machine) -> Feedback:
-        return MyPart(settings)
-
-    return [offer("my_part", MyPartSettings, build)]
+    return [offer("my_part", MyPartSettings, MyPart)]

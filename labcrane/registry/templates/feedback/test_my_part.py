@@ -1,8 +1,5 @@
 """my_part keeps the contract of its role; add what else it promises."""
 
-from types import ModuleType
-
-import my_module
 import pytest
 from my_module import MyPart, MyPartSettings
 
@@ -10,19 +7,12 @@ from labcrane import Feedback
 from labcrane.testing import (
     TARGETS,
     FeedbackContract,
-    PluginContract,
     ch8,
     make_frame,
     make_run,
     make_target,
     opened,
 )
-
-
-class TestPlugin(PluginContract):
-    @pytest.fixture
-    def plugin(self) -> ModuleType:
-        return my_module
 
 
 class TestMyPart(FeedbackContract):

@@ -9,7 +9,6 @@ from labcrane import (
     FloatArray,
     Frame,
     InputDevice,
-    Machine,
     Offer,
     Run,
     Settings,
@@ -53,7 +52,4 @@ class MyPart(InputDevice):
 
 @hookimpl
 def labcrane_inputs() -> list[Offer[InputDevice]]:
-    def build(settings: MyPartSettings, machine: Machine) -> InputDevice:
-        return MyPart(settings)
-
-    return [offer("my_part", MyPartSettings, build)]
+    return [offer("my_part", MyPartSettings, MyPart)]

@@ -1,20 +1,11 @@
 """my_part keeps the contract of its role; add what else it promises."""
 
-from types import ModuleType
-
-import my_module
 import numpy as np
 import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import InputDevice
-from labcrane.testing import InputContract, PluginContract, ch8, make_frame, make_run, opened
-
-
-class TestPlugin(PluginContract):
-    @pytest.fixture
-    def plugin(self) -> ModuleType:
-        return my_module
+from labcrane.testing import InputContract, ch8, make_frame, make_run, opened
 
 
 class TestMyPart(InputContract):

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import PositiveFloat
 
-from labcrane import FloatArray, Machine, Offer, Settings, SignalMonitor, hookimpl, offer
+from labcrane import FloatArray, Offer, Settings, SignalMonitor, hookimpl, offer
 from labcrane.core import SignalFault, SignalStream
 
 labcrane_api = 1
@@ -48,7 +48,4 @@ class MyPart(SignalMonitor):
 
 @hookimpl
 def labcrane_monitors() -> list[Offer[SignalMonitor]]:
-    def build(settings: MyPartSettings, machine: Machine) -> SignalMonitor:
-        return MyPart(settings)
-
-    return [offer("my_part", MyPartSettings, build)]
+    return [offer("my_part", MyPartSettings, MyPart)]

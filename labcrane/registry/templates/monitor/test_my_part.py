@@ -1,23 +1,14 @@
 """my_part keeps the contract of its role; add what else it promises."""
 
-from types import ModuleType
-
-import my_module
 import numpy as np
 import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import FloatArray, SignalMonitor
 from labcrane.core import SignalChannel, SignalStream
-from labcrane.testing import PluginContract, SignalMonitorContract
+from labcrane.testing import SignalMonitorContract
 
 STREAM = SignalStream("Oil", "Temperature", 10.0, (SignalChannel("tank", "°C"),))
-
-
-class TestPlugin(PluginContract):
-    @pytest.fixture
-    def plugin(self) -> ModuleType:
-        return my_module
 
 
 class TestMyPart(SignalMonitorContract):

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from pydantic import Field
 
-from labcrane import Machine, Offer, Questionnaire, Settings, hookimpl, offer
+from labcrane import Offer, Questionnaire, Settings, hookimpl, offer
 from labcrane.core import Answers, Item, Score, numeric_answers
 
 labcrane_api = 1
@@ -43,7 +43,4 @@ class MyPart(Questionnaire):
 
 @hookimpl
 def labcrane_questionnaires() -> list[Offer[Questionnaire]]:
-    def build(settings: MyPartSettings, machine: Machine) -> Questionnaire:
-        return MyPart(settings)
-
-    return [offer("my_part", MyPartSettings, build)]
+    return [offer("my_part", MyPartSettings, MyPart)]

@@ -1,19 +1,10 @@
 """my_part keeps the contract of its role; add what else it promises."""
 
-from types import ModuleType
-
-import my_module
 import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import Questionnaire
-from labcrane.testing import PluginContract, QuestionnaireContract
-
-
-class TestPlugin(PluginContract):
-    @pytest.fixture
-    def plugin(self) -> ModuleType:
-        return my_module
+from labcrane.testing import QuestionnaireContract
 
 
 class TestMyPart(QuestionnaireContract):

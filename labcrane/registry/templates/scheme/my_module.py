@@ -58,7 +58,4 @@ class MyPart(Controller):
 
 @hookimpl
 def labcrane_controllers() -> list[Offer[Controller]]:
-    def build(settings: MyPartSettings, machine: Machine) -> Controller:
-        return MyPart(settings, machine)
-
-    return [offer("my_part", MyPartSettings, build)]
+    return [offer("my_part", MyPartSettings, MyPart)]

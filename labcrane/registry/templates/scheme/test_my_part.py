@@ -1,20 +1,11 @@
 """my_part keeps the contract of its role; add what else it promises."""
 
-from types import ModuleType
-
-import my_module
 import numpy as np
 import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import Controller
-from labcrane.testing import ControllerContract, PluginContract, ch8, crane_at, make_run, opened
-
-
-class TestPlugin(PluginContract):
-    @pytest.fixture
-    def plugin(self) -> ModuleType:
-        return my_module
+from labcrane.testing import ControllerContract, ch8, crane_at, make_run, opened
 
 
 class TestMyPart(ControllerContract):

@@ -5,18 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from pydantic import PositiveFloat
 
-from labcrane import (
-    Frame,
-    Machine,
-    Offer,
-    Run,
-    SecondaryTask,
-    Settings,
-    Signal,
-    Trial,
-    hookimpl,
-    offer,
-)
+from labcrane import Frame, Offer, Run, SecondaryTask, Settings, Signal, Trial, hookimpl, offer
 from labcrane.core import AxisName, Phase, TrialStatus, Value
 
 labcrane_api = 1
@@ -67,7 +56,4 @@ class MyPart(SecondaryTask):
 
 @hookimpl
 def labcrane_secondary() -> list[Offer[SecondaryTask]]:
-    def build(settings: MyPartSettings, machine: Machine) -> SecondaryTask:
-        return MyPart(settings)
-
-    return [offer("my_part", MyPartSettings, build)]
+    return [offer("my_part", MyPartSettings, MyPart)]

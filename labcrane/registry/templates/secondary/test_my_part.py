@@ -1,27 +1,10 @@
 """my_part keeps the contract of its role; add what else it promises."""
 
-from types import ModuleType
-
-import my_module
 import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import SecondaryTask
-from labcrane.testing import (
-    PluginContract,
-    SecondaryTaskContract,
-    ch8,
-    make_frame,
-    make_run,
-    make_trial,
-    opened,
-)
-
-
-class TestPlugin(PluginContract):
-    @pytest.fixture
-    def plugin(self) -> ModuleType:
-        return my_module
+from labcrane.testing import SecondaryTaskContract, ch8, make_frame, make_run, make_trial, opened
 
 
 class TestMyPart(SecondaryTaskContract):

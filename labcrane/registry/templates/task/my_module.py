@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from pydantic import PositiveFloat
 
-from labcrane import Frame, Machine, Offer, Run, Settings, Signal, Task, Trial, hookimpl, offer
+from labcrane import Frame, Offer, Run, Settings, Signal, Task, Trial, hookimpl, offer
 from labcrane.core import Event, Phase, PlannedTrial, TrialStatus
 
 labcrane_api = 1
@@ -70,7 +70,4 @@ class MyPart(Task):
 
 @hookimpl
 def labcrane_tasks() -> list[Offer[Task]]:
-    def build(settings: MyPartSettings, machine: Machine) -> Task:
-        return MyPart(settings)
-
-    return [offer("my_part", MyPartSettings, build)]
+    return [offer("my_part", MyPartSettings, MyPart)]

@@ -1,28 +1,11 @@
 """my_part keeps the contract of its role; add what else it promises."""
 
-from types import ModuleType
-
-import my_module
 import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import Task
 from labcrane.core import Phase
-from labcrane.testing import (
-    PluginContract,
-    TaskContract,
-    ch8,
-    make_frame,
-    make_run,
-    make_trial,
-    opened,
-)
-
-
-class TestPlugin(PluginContract):
-    @pytest.fixture
-    def plugin(self) -> ModuleType:
-        return my_module
+from labcrane.testing import TaskContract, ch8, make_frame, make_run, make_trial, opened
 
 
 class TestMyPart(TaskContract):

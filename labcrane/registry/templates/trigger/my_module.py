@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
-from labcrane import DeviceError, Machine, Offer, Run, Settings, Trigger, hookimpl, offer
+from labcrane import DeviceError, Offer, Run, Settings, Trigger, hookimpl, offer
 from labcrane.core import Echo
 
 labcrane_api = 1
@@ -48,7 +48,4 @@ class MyPart(Trigger):
 
 @hookimpl
 def labcrane_triggers() -> list[Offer[Trigger]]:
-    def build(settings: MyPartSettings, machine: Machine) -> Trigger:
-        return MyPart(settings)
-
-    return [offer("my_part", MyPartSettings, build)]
+    return [offer("my_part", MyPartSettings, MyPart)]

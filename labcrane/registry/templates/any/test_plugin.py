@@ -1,4 +1,4 @@
-"""my_part keeps the contract of plugins; add what else it promises."""
+"""my_part keeps the contract of plugins."""
 
 from types import ModuleType
 
