@@ -14,7 +14,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from labcrane.errors import suggestion
-from labcrane.files.units import EXAMPLES, Unread, unit_of
+from labcrane.files.units import KINDS, Unread, unit_of
 
 Place = tuple[str | int, ...]
 """The keys and indices that lead to a value: ``("sessions", 0, "steps", 2)``."""
@@ -184,7 +184,7 @@ def _number(error: ErrorDetails, model: type[BaseModel], what: str) -> str:
         and (share := _PERCENT.fullmatch(error["input"]))
     ):
         return f"{what}; write {float(share[1]) / 100:g} for {share[0].strip()}"
-    return f"{what} in {unit}, or one with its unit, as {EXAMPLES[unit]}" if unit else what
+    return f"{what} in {unit}, or one with its unit, as {KINDS[unit][1]}" if unit else what
 
 
 def _unit(error: ErrorDetails, model: type[BaseModel]) -> str | None:

@@ -21,48 +21,14 @@ STAMPS = ("PILOT", "SIMULATED")
 """Suffixes of a pseudonym, after a hyphen, for sessions that are not a participant's."""
 
 OURS = frozenset(
-    [
-        "register",
-        "exports",
-        "pool",
-        "evaluation",
-        "labcrane",
-        "labcrane-report",
-        "report",
-        "simulation",
-        "participants",
-        "participant",
-        "session",
-        "sessions",
-        "ses",
-        "sub",
-        "run",
-        "streams",
-        "stream",
-        "trials",
-        "trial",
-        "events",
-        "event",
-        "figures",
-        "tables",
-        "table",
-        "phenotype",
-        "motion",
-        "beh",
-        "eeg",
-        "physio",
-        "code",
-        "data",
-        "derivatives",
-        "sourcedata",
-        "stimuli",
-        "nan",
-        "none",
-        "null",
-        "true",
-        "false",
-    ]
-)
+    {
+        "register", "exports", "pool", "evaluation", "labcrane", "labcrane-report", "report",
+        "simulation", "participants", "participant", "session", "sessions", "ses", "sub", "run",
+        "streams", "stream", "trials", "trial", "events", "event", "figures", "tables", "table",
+        "phenotype", "motion", "beh", "eeg", "physio", "code", "data", "derivatives", "sourcedata",
+        "stimuli", "nan", "none", "null", "true", "false",
+    }
+)  # fmt: skip
 """Folders, files and words of our own records: not allowed as pseudonyms."""
 
 DEVICES = frozenset(

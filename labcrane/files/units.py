@@ -13,26 +13,26 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pint
 
-KINDS: Mapping[str, str] = {
-    "m": "a length",
-    "mm": "a length",
-    "s": "a time",
-    "deg": "an angle",
-    "rad": "an angle",
-    "arcmin": "an angle",
-    "Hz": "a rate",
-    "kg": "a mass",
-    "N": "a force",
-    "N m": "a torque",
-    "m/s": "a speed",
-    "deg/s": "an angular speed",
-    "1/s": "a rate",
-    "day": "a time",
-    "ppm": "a share",
-    "uV": "a voltage",
-    "px": "a number of pixels",
+KINDS: Mapping[str, tuple[str, str]] = {
+    "m": ("a length", "50 cm"),
+    "mm": ("a length", "2 cm"),
+    "s": ("a time", "200 ms"),
+    "deg": ("an angle", "0.5 rad"),
+    "rad": ("an angle", "90 deg"),
+    "arcmin": ("an angle", "0.3 deg"),
+    "Hz": ("a rate", "1 kHz"),
+    "kg": ("a mass", "500 g"),
+    "N": ("a force", "1 kN"),
+    "N m": ("a torque", "1 kN m"),
+    "m/s": ("a speed", "30 cm/s"),
+    "deg/s": ("an angular speed", "0.2 rad/s"),
+    "1/s": ("a rate", "2 Hz"),
+    "day": ("a time", "2 weeks"),
+    "ppm": ("a share", "0.01 %"),
+    "uV": ("a voltage", "0.1 mV"),
+    "px": ("a number of pixels", "1920 px"),
 }
-"""Quantities that are measured in the units of keys."""
+"""The quantity that each unit of keys measures, and how one could be written in another unit."""
 
 ENDINGS: Mapping[str, str] = {
     "_deg_s": "deg/s",
@@ -50,27 +50,6 @@ ENDINGS: Mapping[str, str] = {
     "_days": "day",
 }
 """Units by the end of a key's name; the first that fits holds."""
-
-EXAMPLES: Mapping[str, str] = {
-    "m": "50 cm",
-    "mm": "2 cm",
-    "arcmin": "0.3 deg",
-    "s": "200 ms",
-    "deg": "0.5 rad",
-    "Hz": "1 kHz",
-    "kg": "500 g",
-    "N": "1 kN",
-    "N m": "1 kN m",
-    "rad": "90 deg",
-    "1/s": "2 Hz",
-    "ppm": "0.01 %",
-    "m/s": "30 cm/s",
-    "deg/s": "0.2 rad/s",
-    "day": "2 weeks",
-    "uV": "0.1 mV",
-    "px": "1920 px",
-}
-"""How the same could be written in another unit."""
 
 SPELT = r"^[-+]?[0-9.]+(e[-+]?[0-9]+)? *[A-Za-zµ°Ω][^\n]{0,29}$"
 """A quantity, for a schema."""
@@ -142,9 +121,10 @@ def in_unit(text: str, unit: str) -> float | None:
         number = float(written)
     except ValueError:
         return None
+    kind, example = KINDS[unit]
     asked = (
-        f"where {KINDS[unit]} is required; write a plain number, in {unit}, or {KINDS[unit]} with "
-        f"its unit, as {EXAMPLES[unit]}"
+        f"where {kind} is required; write a plain number, in {unit}, or {kind} with its unit, as "
+        f"{example}"
     )
     if not _UNIT.fullmatch(of) or _MORE.search(of):
         raise ValueError(f"{text!r} has no known unit, {asked}")
@@ -166,7 +146,8 @@ def _converted(number: float, of: str, unit: str, text: str, asked: str) -> floa
     try:
         quantity = units.Quantity(number, measured)
         if _root(quantity.units) != _root(unit):
-            kinds = (kind for name, kind in KINDS.items() if _root(name) == _root(quantity.units))
+            root = _root(quantity.units)
+            kinds = (kind for name, (kind, _) in KINDS.items() if _root(name) == root)
             raise ValueError(f"{text!r} is {next(kinds, 'something else')}, {asked}")
         return float(f"{quantity.to(unit).magnitude:.12g}")
     except failures as error:

@@ -227,13 +227,7 @@ def _zip(search: _Search, file: BinaryIO, name: str, depth: int) -> None:
             try:
                 with archive.open(member) as inner:
                     search.unpacked(cast("BinaryIO", inner), called, depth)
-            except (
-                NotImplementedError,
-                EOFError,
-                OSError,
-                zipfile.BadZipFile,
-                zlib.error,
-            ) as error:
+            except DAMAGED as error:
                 search.closed(called, f"it is damaged, or packed otherwise ({error})")
 
 

@@ -9,7 +9,7 @@ from pydantic.json_schema import models_json_schema
 from labcrane.core.roles import Component
 from labcrane.core.settings import Settings
 from labcrane.files.model import UNIT
-from labcrane.files.units import EXAMPLES, SPELT
+from labcrane.files.units import KINDS, SPELT
 from labcrane.machines.library import machine_names
 from labcrane.protocol.protocol import protocol_model
 from labcrane.protocol.steps import Block, Break, Fixation, Session
@@ -72,9 +72,10 @@ def _with_units(schema: Any) -> Any:
         return inside
     said = {key: inside.pop(key) for key in ABOUT if key in inside}
     words = str(said.get("description", "")).strip()
-    said["description"] = f"{words} Plain numbers are in {unit}; {EXAMPLES[unit]} is fine, too."
+    said["description"] = f"{words} Plain numbers are in {unit}; {KINDS[unit][1]} is fine, too."
     default = said.get("default")
-    shown = EXAMPLES[unit] if not isinstance(default, list) else [EXAMPLES[unit]] * len(default)
+    example = KINDS[unit][1]
+    shown = [example] * len(default) if isinstance(default, list) else example
     said["examples"] = [shown] if default is None else [default, shown]
     return {**said, **_or_quantity(inside)}
 

@@ -89,16 +89,18 @@ def _using(entry: RoleEntry, protocol: str) -> str:
     """Return the protocol with the plugin in it, in place of what it uses of its role."""
     if not entry.keys:
         return protocol
-    key = entry.keys[0]
+    key, own = entry.keys[0], "use: my_part"
+    if entry.word == "capture":
+        own += ", consent: we write lines"
     written = re.search(rf"^{key}:.*\n(?:  .*\n)*", protocol, re.MULTILINE)
     if entry.several:
         named = re.search(r"^  (\w+):", written[0], re.MULTILINE) if written else None
-        used = f"{key}:\n  {named[1] if named else 'my_part'}: {{use: my_part}}\n"
+        used = f"{key}:\n  {named[1] if named else 'my_part'}: {{{own}}}\n"
     else:
         used = f"{key}: {{use: my_part}}\n"
     if entry.word == "input":
-        own = "operator: {use: my_part}"
-        protocol = re.sub(r"^operator:.*$", f"{own}  {STANDS_IN}", protocol, flags=re.MULTILINE)
+        operator = f"operator: {{use: my_part}}  {STANDS_IN}"
+        protocol = re.sub(r"^operator:.*$", operator, protocol, flags=re.MULTILINE)
     if entry.word == "cue":  # which views draw
         used += "views:\n  window: {use: view}\n"
     protocol = protocol.replace(written[0] if written else "sessions:\n", used, 1) + (

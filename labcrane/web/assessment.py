@@ -9,7 +9,6 @@ from labcrane.analysis.scoring.settings import COUNTS, RATINGS, TIME, IndicatorS
 from labcrane.core.records import Event, Value
 
 SHARE = "score.share"
-ORDERS = ("order.override", "order.completion")
 LIVE = {name: f"task.mistakes.{name}" for name in COUNTS}
 """The columns of a frame that hold what has been counted so far."""
 

@@ -2,7 +2,10 @@
 
 from typing import Any
 
+from nicegui import ui
+
 from labcrane.session.commands import Order
+from labcrane.web.control_room.element import STYLE, Room
 from labcrane.web.control_room.snapshot import Snapshot
 from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PRIMARY, PageContext, prepare
@@ -30,10 +33,6 @@ KEYS: tuple[tuple[str, str], ...] = (
 
 def supervisor_page(context: PageContext) -> None:
     """Build the page."""
-    from nicegui import ui  # noqa: PLC0415 - loads for a second
-
-    from labcrane.web.control_room.element import STYLE, Room  # noqa: PLC0415
-
     ui.page_title(f"{context.participant} · labcrane")
     ui.colors(primary=PRIMARY)
     ui.add_css(STYLE)

@@ -2,16 +2,13 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+
+from nicegui import ui
 
 from labcrane.core.items import Item, in_order
 from labcrane.core.records import Value
 from labcrane.session.commands import Order
 from labcrane.web.page import PageContext
-
-if TYPE_CHECKING:
-    from nicegui import ui
-
 from labcrane.web.server.access import PARTICIPANT
 
 HEADING = "role=heading aria-level=2"
@@ -42,8 +39,6 @@ class Form:
 
     def build(self) -> None:
         """Build it where the page stands, and keep it up to date."""
-        from nicegui import ui  # noqa: PLC0415 - loads for a second
-
         self._area = ui.element("div").classes("form")
         ui.timer(0.1, self.update)
 
@@ -63,8 +58,6 @@ class Form:
             refresh()
 
     def _rebuild(self, name: str | None, *, over: bool) -> None:
-        from nicegui import ui  # noqa: PLC0415
-
         session = self._context.session
         if name is None or over:
             ended = "data-over" if over and self._page == PARTICIPANT else ""
@@ -94,8 +87,6 @@ class Form:
         self._context.give(self._page, Order.SUBMIT)
 
     def _progress(self, items: "Sequence[Item]") -> None:
-        from nicegui import ui  # noqa: PLC0415
-
         with ui.element("div").classes("form-progress"):
             bar = ui.element("progress").props(f"value=0 max={max(1, len(items))}")
             line = ui.label().props('id="answered" role=status')
@@ -114,7 +105,6 @@ class Form:
 
     def _one_by_one(self, cards: "Sequence[ui.element]", hand_in: "ui.button") -> None:
         """Show one item per screen; the whole questionnaire is submitted together."""
-        from nicegui import ui  # noqa: PLC0415
 
         def go(step: int) -> None:
             self._at = min(max(self._at + step, 0), len(cards) - 1)
@@ -135,8 +125,6 @@ class Form:
         self._refreshers.append(refresh)
 
     def _item(self, name: str, item: Item) -> "ui.element":
-        from nicegui import ui  # noqa: PLC0415
-
         card = ui.element("div").classes("form-item")
         card.props(f'role=group id="item-{item.name}" aria-labelledby="asked-{item.name}"')
         with card:
@@ -169,8 +157,6 @@ class Form:
     def _choices(
         self, name: str, item: Item, values: "Mapping[float, str] | Mapping[str, str]"
     ) -> None:
-        from nicegui import ui  # noqa: PLC0415
-
         fine = " form-fine" if len(values) > FEW_TICKS else ""
         scale = f"form-scale{fine}" if item.kind == "scale" else "form-choices"
         if item.words:
@@ -201,8 +187,6 @@ class Form:
         return refresh
 
     def _field(self, name: str, item: Item) -> None:
-        from nicegui import ui  # noqa: PLC0415
-
         held = self._context.session.answers.get(item.name)
         hint = "" if item.kind == "text" else self._words.takes(item)
         shown = "" if held is None else f"{held:g}" if isinstance(held, float) else str(held)
@@ -299,8 +283,6 @@ class ConsentCard:
 
     def build(self) -> None:
         """Build it where the page stands, and keep it up to date."""
-        from nicegui import ui  # noqa: PLC0415 - loads for a second
-
         self._area = ui.column().classes("w-full")
         ui.timer(0.1, self._update)
 
@@ -314,8 +296,6 @@ class ConsentCard:
                     self._rebuild(version)
 
     def _rebuild(self, version: str) -> None:
-        from nicegui import ui  # noqa: PLC0415
-
         asked, words = self._context.session.consent, self._context.words(self._page)
         with ui.card().classes("w-full").props('id="consent"'):
             ui.label(words.consent).classes("text-2xl font-medium").props(

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from nicegui import ui
+
 from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PageContext, prepare
 from labcrane.web.panels import Reports
@@ -12,8 +14,6 @@ STYLE = Path(__file__).with_name("form.css")
 
 def participant_page(context: PageContext) -> None:
     """Build the page."""
-    from nicegui import ui  # noqa: PLC0415 - loads for a second
-
     page = context.study.protocol.page
     ui.page_title(context.study.protocol.title or "labcrane")
     ui.colors(primary=page.colour)

@@ -6,6 +6,9 @@ What is answered is checked as in a session, and kept nowhere.
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+from fastapi import FastAPI, Response
+from nicegui import ui
+
 from labcrane.core.records import Event
 from labcrane.design.plan import SessionPlan
 from labcrane.protocol.study import Study
@@ -61,9 +64,6 @@ class Filled:
 
 def serve(study: Study, plan: SessionPlan, port: int, say: Callable[[str], None]) -> None:
     """Serve the pages to this computer until it is interrupted; ``say`` receives their link."""
-    from fastapi import FastAPI, Response  # noqa: PLC0415 - loads for a second
-    from nicegui import ui  # noqa: PLC0415
-
     pages = list(previewed(study, plan))
     context = PageContext(
         study, plan, plan.participant, SessionView(), Live(SOURCE), Pictures(SOURCE, {}),

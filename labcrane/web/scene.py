@@ -3,6 +3,8 @@
 import math
 from collections.abc import Mapping, Sequence
 
+from nicegui import ui
+
 from labcrane.core.primitives import Shape
 from labcrane.core.records import Run
 from labcrane.machines.links import link_boxes
@@ -26,7 +28,6 @@ CAMERAS: Mapping[str, tuple[float, float, float]] = {
 
 def camera_buttons(scenes: "Sequence[MachineScene]") -> None:
     """Build a button for each camera where the page stands; it turns all scenes."""
-    from nicegui import ui  # noqa: PLC0415 - loads for a second
 
     def look(name: str) -> None:
         for scene in scenes:
@@ -49,8 +50,6 @@ class MachineScene:
     """
 
     def __init__(self, machine: Machine, bodies: Sequence[Body], about: str) -> None:
-        from nicegui import ui  # noqa: PLC0415
-
         self._span = span(machine)
         with ui.element("div").classes("w-full").props(f'role=img aria-label="{about}"'):
             grid = round(2 * self._span), 20
@@ -92,8 +91,6 @@ class SceneView:
 
     def build(self) -> None:
         """Build it where the page stands, and keep it up to date."""
-        from nicegui import ui  # noqa: PLC0415
-
         machine = self._context.study.machine
         scenes: list[MachineScene] = []
         camera_buttons(scenes)

@@ -77,11 +77,6 @@ class Calibrations(Settings):
     right: Calibration
     """The other."""
 
-    @property
-    def ports(self) -> tuple[str, str]:
-        """The sockets of the left and the right stick."""
-        return (self.left.port, self.right.port)
-
 
 def default_path() -> Path:
     """Return the user's file: in ``$LABCRANE_CONFIG``, or else in ``~/.config/labcrane``."""

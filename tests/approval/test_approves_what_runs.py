@@ -13,7 +13,7 @@ from labcrane.approval.materials import materials
 from labcrane.design.plan import plan_session
 from labcrane.design.quest_plus import grid
 from labcrane.errors import ProtocolError
-from labcrane.files.units import EXAMPLES, KINDS, in_unit
+from labcrane.files.units import KINDS, in_unit
 from labcrane.protocol.questions import PLAUSIBLE, questions
 from labcrane.protocol.streams import TimeLimits
 from labcrane.protocol.study import load
@@ -335,8 +335,8 @@ def test_what_is_wrong_of_several_keys_has_the_line_of_one_of_them(told, section
 
 
 def test_every_unit_that_keys_ask_for_has_an_example_and_sizes_that_can_be_meant() -> None:
-    assert KINDS.keys() == EXAMPLES.keys() == PLAUSIBLE.keys() - {""}
-    assert all(in_unit(example, unit) is not None for unit, example in EXAMPLES.items())
+    assert KINDS.keys() == PLAUSIBLE.keys() - {""}
+    assert all(in_unit(example, unit) is not None for unit, (_, example) in KINDS.items())
     with pytest.raises(
         ValueError, match="'2 cm' is a length, where a number of pixels is required"
     ):

@@ -13,8 +13,6 @@ from labcrane.files.model import StrictModel
 from labcrane.files.system import is_file
 from labcrane.machines.machine import FEWEST_JOINTS, Machine
 
-NAME = r"^[a-z][a-z0-9_]*$"
-
 
 class MachineDescription(StrictModel):
     """A machine of another program's file: ``{urdf: arm.urdf, joints: [...], tip: hook}``."""

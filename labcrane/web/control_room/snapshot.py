@@ -4,6 +4,7 @@ import json
 import math
 import time
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 from labcrane.analysis.presented import operators_views
@@ -83,12 +84,12 @@ class Snapshot:
             "left": self._left(state),
             "done": session.trials_done,
             "total": len(plan.trials),
-            "lamp": {"level": lamp.level, "reason": lamp.reason, "remedy": lamp.remedy},
+            "lamp": asdict(lamp),
             "alarm": session.alarm,
             "faults": self._faults(),
             "asked": session.form is not None,
             "buttons": [button.as_json() for button in buttons(session)],
-            "report": self._report(),
+            "report": asdict(session.ended) if session.ended else None,
         }  # fmt: skip
 
     def _body(self) -> dict[str, Any]:
@@ -166,16 +167,6 @@ class Snapshot:
         if state == "ended" or not trials:
             return "over" if state == "ended" else "-"
         return f"{_long(left)} left"
-
-    def _report(self) -> dict[str, Any] | None:
-        ended = self._context.session.ended
-        if ended is None:
-            return None
-        return {
-            "level": ended.level, "verdict": ended.verdict, "remedy": ended.remedy,
-            "saved": list(ended.saved), "columns": list(ended.columns),
-            "rows": [list(row) for row in ended.rows], "advice": list(ended.advice),
-        }  # fmt: skip
 
     def _results(self) -> dict[str, Any]:
         rows = self._context.session.rows

@@ -5,15 +5,20 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from fastapi import FastAPI
+from nicegui import ui
+
 from labcrane.errors import LabcraneError, RecordingError
 from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.registry.registry import Registry
+from labcrane.web.control_room.element import STYLE
 from labcrane.web.control_room.shown import ShownShapes
 from labcrane.web.page import PRIMARY, prepare
 from labcrane.web.scene import MachineScene, camera_buttons
 from labcrane.web.server.access import VIEWER
 from labcrane.web.server.serving import AWAY_S, build_pages, serve_here
 from labcrane.web.viewer.codes import TAKEN, Opening
+from labcrane.web.viewer.element import Timeline
 from labcrane.web.viewer.film import Film
 from labcrane.web.viewer.glances import Glances
 from labcrane.web.viewer.marks import Marks
@@ -35,8 +40,6 @@ class Screen:
 
     def build(self) -> MachineScene:
         """Build it where the page stands."""
-        from nicegui import ui  # noqa: PLC0415 - loads for a second
-
         film = self._film
         with ui.element("div"):
             ui.label(film.called).classes("font-medium")
@@ -55,11 +58,6 @@ class Screen:
 
 def viewer_page(films: Sequence[Film], registry: Registry, opening: Opening) -> None:
     """Build the page: one machine for each film, side by side at the same second."""
-    from nicegui import ui  # noqa: PLC0415
-
-    from labcrane.web.control_room.element import STYLE  # noqa: PLC0415 - brings charts, too
-    from labcrane.web.viewer.element import Timeline  # noqa: PLC0415
-
     first = films[0]
     ui.page_title(f"{first.called} · labcrane")
     ui.colors(primary=PRIMARY)
@@ -159,9 +157,6 @@ def serve(
     say: Callable[[str], None],
 ) -> None:
     """Serve the viewer to this computer until it is interrupted; ``say`` receives its link."""
-    from fastapi import FastAPI  # noqa: PLC0415
-    from nicegui import ui  # noqa: PLC0415
-
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
 
     @ui.page("/viewer", reconnect_timeout=AWAY_S)

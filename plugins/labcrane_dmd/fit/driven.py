@@ -15,7 +15,7 @@ from labcrane_dmd.arm.arm import DmdArm
 from labcrane_dmd.arm.settings import ArmSettings, JawsSettings
 from labcrane_dmd.fit.fitting import LAGS, curve_at
 from labcrane_dmd.fit.recordings import JointRun, SegmentRecording
-from labcrane_dmd.fit.validation import Level, validation_signals
+from labcrane_dmd.fit.validation import Level, of_segments, validation_signals
 from labcrane_dmd.model.model import Model, SegmentModel
 
 LONGER = 1.1
@@ -90,12 +90,7 @@ def drive(
             f"the machine has no joint {', '.join(map(repr, missing))}, which the model describes; "
             f"it has {', '.join(machine.names)}"
         )
-    named = {recording.name: recording for recording in recordings}
-    if missing := [name for name in model if name not in named]:
-        raise RecordingError(
-            f"there is no recording of {', '.join(missing)}, which the model has; there are "
-            f"recordings of {', '.join(named)}"
-        )
+    named = of_segments(model, recordings)
     bench = _Bench(DmdArm(settings, machine, model), machine, rate_hz)
     try:
         found = []
