@@ -23,6 +23,7 @@ from needs import need, not_tried
 from once import RUN_FOLDER
 from port_block import claim
 
+from labcrane.registry.registry import Registry, discover
 from labcrane.streams.network import LOOPBACK
 
 _FOLDER = Path(tempfile.mkdtemp(prefix="labcrane-tests-"))
@@ -56,6 +57,22 @@ settings.register_profile(
     "tests", settings(), deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("tests")
+
+
+@pytest.fixture(scope="module")
+def registry() -> Registry:
+    """What is installed."""
+    return discover()
+
+
+@pytest.fixture
+def table() -> Iterator[object]:
+    """A desk at which sticks can be plugged in."""
+    from virtual_sticks import desk
+
+    with desk() as table:
+        yield table
+
 
 WAITING = 2
 """Processes beyond one a core: many tests wait, for a session in real time or for a device.

@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from labcrane.errors import ProtocolError
 from labcrane.files.study_folder import DATA, data_of, protocol_of
+
+if TYPE_CHECKING:
+    from labcrane.protocol.study import Study
 
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON, for scripts")]
 STUDY = "the study: its folder, its protocol or its data folder"
@@ -21,6 +24,14 @@ def protocol_in(path: Path | None) -> Path | None:
 def data_in(path: Path | None) -> Path | None:
     """Return a study's data folder where a study was given."""
     return None if path is None else data_of(path)
+
+
+def study_of(protocol: Path) -> "Study":
+    """Return the study of a protocol, with the plugins that are there for it."""
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
+
+    return load(protocol, discover(study=protocol))
 
 
 def data_here() -> Path:

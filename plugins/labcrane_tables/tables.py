@@ -38,6 +38,16 @@ READER = "read.R"
 GZIP_LEVEL = 1  # 9 takes eight times as long and saves a fifth
 
 
+ALWAYS = {"questionnaires": answers_of, "scores": scores_of}
+SOMETIMES = {
+    "annotations": annotations_of,
+    "fixations": fixations_of,
+    "responses": responses_of,
+    "films": films_of,
+}
+"""Tables of a participant by name; these are written where they have rows, and as CSV alone."""
+
+
 class Tables(Exporter):
     """CSV and Parquet, a codebook of all columns, and ``read.R``, which loads everything.
 
@@ -65,8 +75,8 @@ class Tables(Exporter):
         import pandas as pd
 
         (folder / "streams").mkdir()
-        people, trials, answers, scores, marks, looked_at = [], [], [], [], [], []
-        responded, films = [], []
+        people, trials = [], []
+        found: dict[str, list[pd.DataFrame]] = {name: [] for name in (*ALWAYS, *SOMETIMES)}
         names = Names()
         book = Codebook(names)
         events = _Growing(folder / "events")
@@ -75,34 +85,20 @@ class Tables(Exporter):
             measures = beside_trials(measures_of(participant), participant)
             trials.append(names.table(measures))
             book.add(participant, measures)
-            answers.append(answers_of(participant))
-            marks.append(annotations_of(participant))
-            looked_at.append(fixations_of(participant))
-            responded.append(responses_of(participant))
-            films.append(films_of(participant))
+            for name, table_of in (ALWAYS | SOMETIMES).items():
+                found[name].append(table_of(participant))
             if self._settings.films:
-                _copy_films(participant, films[-1], folder / "films")
-            scores.append(scores_of(participant))
+                _copy_films(participant, found["films"][-1], folder / "films")
             for number, session in participant.sessions():
                 events.add(_events(participant, number, session))
                 self._streams(participant, number, session, folder / "streams", book)
         book.has("events", events.close())
-        for name, tables in (
-            ("annotations", marks),
-            ("fixations", looked_at),
-            ("responses", responded),
-            ("films", films),
-        ):
-            if any(map(len, tables)):
-                book.has(name, write_csv(joined(tables), folder / f"{name}.csv"))
-        seen = with_unseen_areas(joined(trials))
-        for name, tables in (
-            ("trials", [seen]),
-            ("questionnaires", answers),
-            ("scores", scores),
-            ("participants", [pd.DataFrame(people)]),
-        ):
-            everything = joined(tables)
+        for name in SOMETIMES:
+            if any(map(len, found[name])):
+                book.has(name, write_csv(joined(found[name]), folder / f"{name}.csv"))
+        whole = {"trials": with_unseen_areas(joined(trials))}
+        whole |= {name: joined(found[name]) for name in ALWAYS}
+        for name, everything in (whole | {"participants": pd.DataFrame(people)}).items():
             book.has(name, write_csv(everything, folder / f"{name}.csv"))
             everything.to_parquet(folder / f"{name}.parquet", index=False)
         write_csv(book.table(), folder / "codebook.csv")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
-from rehearsal import SHORT
+from rehearsal import SHORT, said_of
 
 from labcrane.approval.materials import materials
 from labcrane.design.plan import plan_session
@@ -18,31 +18,16 @@ from labcrane.protocol.questions import PLAUSIBLE, questions
 from labcrane.protocol.streams import TimeLimits
 from labcrane.protocol.study import load
 from labcrane.protocol.tracks import QuestPlus
-from labcrane.registry.registry import Registry, discover
+from labcrane.registry.registry import Registry
 from labcrane.simulation.rehearsal import rehearse
 
 FED = SHORT.replace("sessions:", "feedback: {ball: {use: sphere}}\nsessions:")
 
 
-@pytest.fixture(scope="module")
-def registry() -> Registry:
-    return discover()
-
-
 @pytest.fixture
 def told(tmp_path: Path, registry: Registry):
     """Return what is said of a protocol, its file left out."""
-
-    def tell(text: str) -> list[str]:
-        path = tmp_path / "study.yaml"
-        path.write_text(text, encoding="utf-8")
-        try:
-            load(path, registry)
-        except ProtocolError as error:
-            return str(error).replace(f"{path}:", "").splitlines()
-        return []
-
-    return tell
+    return lambda text: said_of(tmp_path / "study.yaml", text, registry)
 
 
 def line_of(text: str, part: str) -> int:

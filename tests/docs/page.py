@@ -22,6 +22,7 @@ A block without a language lists files that are there.
 External links are only listed: other sites must not fail our tests.
 """
 
+import importlib.util
 import json
 import os
 import re
@@ -32,6 +33,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from xml.etree import ElementTree
 
 from docs.person import Person
@@ -45,6 +47,18 @@ from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 
 ROOT = Path(__file__).parents[2]
+
+
+def program(name: str) -> ModuleType:
+    """Return a program of the folder of the documentation, imported."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
 PAGES = sorted([ROOT / "README.md", ROOT / "plugins" / "README.md", *(ROOT / "docs").glob("*.md")])
 PAGES += sorted((ROOT / "docs" / "own").glob("*.md"))
 

@@ -1,13 +1,11 @@
 """The page of the architecture draws the contract as it is, and its ways can be walked."""
 
 import ast
-import importlib.util
 import re
 from pathlib import Path
-from types import ModuleType
 
 import pytest
-from docs.page import ROOT
+from docs.page import ROOT, program
 
 PAGE = (ROOT / "docs" / "architecture.md").read_text()
 PATHS = (ROOT / "docs" / "data-paths.md").read_text()
@@ -15,15 +13,6 @@ WAYS = dict(re.findall(r"^## (.*?)\n(.*?)(?=^#|\Z)", PATHS, re.M | re.S))
 STEP = re.compile(r"^(\d+)\. `([\w.]+)`: (.*)$", re.M)
 IMPORTED, IMPORTS = re.compile(r"\(imported by (\d+)\)"), re.compile(r"\(imports (\d+)\)")
 BOTH = re.compile(r"\(both know `([^`]+)`: (\d+)\)")
-
-
-def generate() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def source(module: str) -> str:
@@ -40,7 +29,7 @@ def imported(module: str) -> set[str]:
 
 
 def test_the_picture_is_that_of_the_contract() -> None:
-    assert generate().with_floors(PAGE) == PAGE, "python docs/generate.py --architecture"
+    assert program("generate").with_floors(PAGE) == PAGE, "python docs/generate.py --architecture"
     assert "| `session` |" in PAGE
 
 

@@ -1,23 +1,11 @@
 """README and docs stay short: words, pages, and sentences have limits."""
 
-import importlib.util
 from pathlib import Path
-from types import ModuleType
 
 import pytest
-from docs.page import ROOT
+from docs.page import ROOT, program
 
-
-def load() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("count_words", ROOT / "docs" / "count.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-count = load()
+count = program("count")
 
 
 def test_the_readme_and_the_changelog_are_short() -> None:

@@ -1,6 +1,5 @@
 """Pages that are read off the program have every key, every component and every signal."""
 
-import importlib.util
 import re
 from pathlib import Path
 from types import ModuleType
@@ -8,7 +7,7 @@ from types import ModuleType
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from docs.page import ROOT
+from docs.page import ROOT, program
 from needs import need
 
 from labcrane.cli.app import main
@@ -21,12 +20,7 @@ from labcrane.registry.registry import discover
 @pytest.fixture(scope="module")
 def generate() -> ModuleType:
     need("pybullet")  # a page has what each part records, and a part is built for that
-    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return program("generate")
 
 
 @pytest.fixture(scope="module")

@@ -1,11 +1,11 @@
 """The look at the joysticks, with virtual ones that are moved when the person is told to."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pygame
 import pytest
-from virtual_sticks import Desk, VirtualStick, desk
+from virtual_sticks import Desk, VirtualStick
 
 from labcrane import Offer, Settings
 from labcrane.core import Finding, Verdict
@@ -33,12 +33,6 @@ class TestExamination(ExaminationContract):
 @pytest.fixture(autouse=True)
 def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LABCRANE_CONFIG", str(tmp_path))
-
-
-@pytest.fixture
-def table() -> Iterator[Desk]:
-    with desk() as table:
-        yield table
 
 
 class Person:

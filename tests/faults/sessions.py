@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -50,6 +51,58 @@ def labcrane(*arguments: object, **options: object) -> "subprocess.Popen[str]":
         text=True,
         **pipes | options,
     )
+
+
+def put_recorded(folder: Path, needs: str, *, limit_s: int, **on_fault: str) -> None:
+    """Write a study whose controls are those of a simulated session, which is run before."""
+    text = STUDY.format(study=unique(folder.name))
+    (folder / "first.yaml").write_text(text)
+    labcrane(
+        "run", "first.yaml", "--participant", "P001", "--simulate", "--fast", cwd=folder
+    ).communicate()
+    recorded = "{use: recorded, file: data/P001-SIMULATED/P001-SIMULATED.h5}"
+    text = text.replace("{use: dual_joystick}", recorded)
+    text = text.replace("limit_s: 0.3", f"limit_s: {limit_s}")
+    faults = "".join(f", {name}: {what}" for name, what in on_fault.items())
+    text = text.replace("session_died: redo_trial", f"session_died: redo_trial{faults}")
+    (folder / "study.yaml").write_text(text + needs)
+
+
+class Conversation:
+    """What a launched session prints, and what it is told."""
+
+    def __init__(self, process: "subprocess.Popen[str]") -> None:
+        self.process = process
+        self.said: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        for line in self.process.stdout:
+            self.said.append(line.strip())
+
+    def until(self, words: str, times: int = 1) -> None:
+        wait_for(lambda: sum(words in line for line in self.said) >= times)
+
+    def order(self, words: str) -> None:
+        self.process.stdin.write(words + "\n")
+        self.process.stdin.flush()
+
+    def end(self) -> str:
+        self.process.wait(240)
+        self._reader.join()
+        self.process.stdout.close()
+        self.process.stdin.close()
+        return "\n".join(self.said)
+
+
+def talking(folder: Path) -> tuple["subprocess.Popen[str]", Conversation]:
+    """Start a pilot session of the study in a folder; return its process and its terminal."""
+    process = labcrane(
+        "run", "study.yaml", "--participant", "P001", "--local", "--pilot",
+        cwd=folder, stdin=subprocess.PIPE,
+    )  # fmt: skip
+    return process, Conversation(process)
 
 
 def run_second(protocol: Path, data: Path) -> "subprocess.Popen[str]":

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from faults.sessions import STUDY, labcrane, unique, wait_for
-from faults.test_streams import Conversation
+from faults.sessions import put_recorded, talking, unique, wait_for
 from own_modules import OWN_MODULES
 
 from labcrane import open_recording
@@ -49,26 +48,9 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
     """Run a session in which a channel is flat for a while; yield its file and what was said."""
     folder = tmp_path_factory.mktemp("signals")
     source = unique("head")
-    text = STUDY.format(study=unique("signals"))
-    (folder / "first.yaml").write_text(text)
-    simulated = labcrane(
-        "run", "first.yaml", "--participant", "P001", "--simulate", "--fast", cwd=folder
-    )
-    simulated.communicate()
-    recorded = "{use: recorded, file: data/P001-SIMULATED/P001-SIMULATED.h5}"
-    text = text.replace("{use: dual_joystick}", recorded).replace("limit_s: 0.3", "limit_s: 60")
-    (folder / "study.yaml").write_text(text + NEEDS.format(source=source))
+    put_recorded(folder, NEEDS.format(source=source), limit_s=60)
     head = Head(source)
-    arguments = ["run", "study.yaml", "--participant", "P001", "--local", "--pilot"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "labcrane", *arguments],
-        cwd=folder,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    said = Conversation(process)
+    process, said = talking(folder)
     try:
         said.until("space to start")
         said.order("start")

@@ -2,13 +2,12 @@
 
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from faults.sessions import STUDY, journals, labcrane, recorders, spares, unique, wait_for
+from faults.sessions import journals, put_recorded, recorders, spares, talking, unique, wait_for
 
 from labcrane import open_recording
 from labcrane.recording.foreign_streams import read_streams
@@ -56,70 +55,15 @@ def all_receive(launcher: "subprocess.Popen[str]") -> bool:
     return len(found) == RECORDERS
 
 
-class Conversation:
-    """What a launched session prints, and what it is told."""
-
-    def __init__(self, process: "subprocess.Popen[str]") -> None:
-        self.process = process
-        self.said: list[str] = []
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def _read(self) -> None:
-        for line in self.process.stdout:
-            self.said.append(line.strip())
-
-    def until(self, words: str, times: int = 1) -> None:
-        wait_for(lambda: sum(words in line for line in self.said) >= times)
-
-    def order(self, words: str) -> None:
-        self.process.stdin.write(words + "\n")
-        self.process.stdin.flush()
-
-    def end(self) -> str:
-        self.process.wait(240)
-        self._reader.join()
-        self.process.stdout.close()
-        self.process.stdin.close()
-        return "\n".join(self.said)
-
-
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
     """Run a session in which everything happens; yield its folder and what was printed."""
     folder = tmp_path_factory.mktemp("streams")
     source = unique("amplifier")
-    text = STUDY.format(study=unique("streams"))
-    (folder / "first.yaml").write_text(text)
-    simulated = labcrane(
-        "run", "first.yaml", "--participant", "P001", "--simulate", "--fast", cwd=folder
-    )
-    simulated.communicate()
-    recorded = "{use: recorded, file: data/P001-SIMULATED/P001-SIMULATED.h5}"
-    text = text.replace("{use: dual_joystick}", recorded).replace("limit_s: 0.3", "limit_s: 30")
-    text = text.replace("session_died: redo_trial", "session_died: redo_trial, input_lost: pause")
-    (folder / "study.yaml").write_text(text + NEEDS.format(source=source))
     sender = Sender(source)
     plates = [Sender(f"{source}-{each}", each, f"{source}-force") for each in ("Mine", "His")]
-    process = subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "labcrane",
-            "run",
-            "study.yaml",
-            "--participant",
-            "P001",
-            "--local",
-            "--pilot",
-        ],
-        cwd=folder,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    said = Conversation(process)
+    put_recorded(folder, NEEDS.format(source=source), limit_s=30, input_lost="pause")
+    process, said = talking(folder)
     try:
         said.until("is not on the network")
         for plate in plates:

@@ -1,7 +1,6 @@
 """A study with every product of every command, and what is in every file that is left of it."""
 
 import gzip
-import hashlib
 import io
 import re
 import shutil
@@ -11,7 +10,7 @@ from pathlib import Path
 
 import h5py
 import pandas as pd
-from governance.kept_people import killed_at
+from governance.kept_people import files, killed_at
 from governed import GOVERNED, TODAY, Lab
 from needs import GRAPHICS, missing
 from pyarrow import parquet
@@ -151,14 +150,6 @@ def says(path: Path, name: str) -> bool:
     bare = name.replace("-", "")
     word = re.compile(rf"(?<![A-Za-z0-9])({name}|{bare})(?![0-9])")
     return any(word.search(text) for text in (str(path.name), *opened(path.read_bytes())))
-
-
-def files(folder: Path) -> dict[str, str]:
-    return {
-        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
 
 
 def own(folder: Path, name: str) -> dict[str, str]:

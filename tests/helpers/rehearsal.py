@@ -10,9 +10,10 @@ from simple_crane import CRANE
 from labcrane.core.clock import Clock, ManualClock
 from labcrane.core.records import Event, Frame, Run
 from labcrane.design.plan import plan_session
+from labcrane.errors import ProtocolError
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import discover
+from labcrane.registry.registry import Registry, discover
 from labcrane.session import loop
 from labcrane.session.commands import Command
 from labcrane.session.sequencer import Sequencer
@@ -40,6 +41,16 @@ def a_study(folder: Path, text: str = SHORT) -> Study:
     path = folder / "study.yaml"
     path.write_text(text, encoding="utf-8")
     return load(path, discover())
+
+
+def said_of(path: Path, text: str, registry: Registry) -> list[str]:
+    """Write a protocol, and return what is said of it, without its name."""
+    path.write_text(text, encoding="utf-8")
+    try:
+        load(path, registry)
+    except ProtocolError as error:
+        return str(error).replace(f"{path}:", "").splitlines()
+    return []
 
 
 class ScriptedConsole:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
-from virtual_sticks import COLUMNS, MODEL, Desk, VirtualStick, both, desk, open_fails, read
+from virtual_sticks import COLUMNS, MODEL, Desk, VirtualStick, both, open_fails, read
 
 from labcrane import InputDevice
 from labcrane.testing import InputContract, ch8, make_run, opened
@@ -24,12 +24,6 @@ from labcrane_joystick.stick import attached, model_of
 def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("LABCRANE_CONFIG", str(tmp_path))
     return tmp_path / "joysticks.yaml"
-
-
-@pytest.fixture
-def table() -> Iterator[Desk]:
-    with desk() as table:
-        yield table
 
 
 @pytest.fixture

@@ -1,12 +1,12 @@
 """Which stick is the left one, where its axes end, and the file that keeps it."""
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_sticks import MODEL, Desk, VirtualStick, both, desk, read
+from virtual_sticks import MODEL, VirtualStick, both, read
 
 from labcrane import DeviceError
 from labcrane.testing import ch8, make_run, opened
@@ -28,12 +28,6 @@ from labcrane_joystick.stick import attached
 def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("LABCRANE_CONFIG", str(tmp_path))
     return tmp_path / "joysticks.yaml"
-
-
-@pytest.fixture
-def table() -> Iterator[Desk]:
-    with desk() as table:
-        yield table
 
 
 def test_each_side_of_an_axis_is_linear_to_its_own_end():

@@ -2,7 +2,6 @@
 
 import re
 from collections import Counter
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ import synthetic_signals as synthetic
 import labcrane_signals
 from labcrane import FloatArray, SignalMonitor
 from labcrane.core import SignalChannel, SignalStream
-from labcrane.testing import PluginContract, SignalMonitorContract, ch8
+from labcrane.testing import SignalMonitorContract, ch8
 
 WITHIN_S = 5.0
 FOUND = 0.95
@@ -221,12 +220,6 @@ def test_a_force_beyond_the_sensor_is_a_wrong_unit() -> None:
     (fault,) = monitor.look(np.empty(500), 1000.0 * force)
     assert fault.kind == "wrong unit"
     assert "beyond 500" in fault.message
-
-
-class TestPlugin(PluginContract):
-    @pytest.fixture
-    def plugin(self) -> ModuleType:
-        return labcrane_signals
 
 
 class TestEeg(SignalMonitorContract):

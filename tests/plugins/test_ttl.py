@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +17,6 @@ from needs import needs
 from rehearsal import SHORT, ScriptedConsole, a_study
 
 import labcrane
-import labcrane_ttl
 from labcrane import DeviceError, PluginError, ProtocolError, Trigger
 from labcrane.core import Echo, Event
 from labcrane.core.clock import Tick
@@ -26,7 +25,7 @@ from labcrane.protocol.questions import questions
 from labcrane.registry.registry import discover
 from labcrane.session.session import Visit, run
 from labcrane.streams.triggers import Triggers
-from labcrane.testing import PluginContract, TriggerContract, ch8, make_frame, make_run, opened
+from labcrane.testing import TriggerContract, ch8, make_frame, make_run, opened
 from labcrane_ttl.parallel_port import CLAIM, WRITE, ParallelTrigger
 from labcrane_ttl.serial_port import KEPT, SerialTrigger, as_byte
 from labcrane_ttl.settings import BoxSettings, ParallelSettings, SerialSettings
@@ -102,12 +101,6 @@ def answering() -> Iterator[Device]:
     made = Device(DELAY_S)
     yield made
     made.close()
-
-
-class TestPlugin(PluginContract):
-    @pytest.fixture
-    def plugin(self) -> ModuleType:
-        return labcrane_ttl
 
 
 class TestSerial(TriggerContract):

@@ -11,15 +11,10 @@ from wrong_protocols import PROTOCOLS, SKELETONS, Wrong, faults, lay_out, right,
 from labcrane import ProtocolError
 from labcrane.protocol.questions import about, questions
 from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import Registry, discover
+from labcrane.registry.registry import Registry
 from labcrane.simulation import rehearsal
 
 STUDIES = (*sorted(path.parent.name for path in PROTOCOLS.glob("*/protocol.yaml")), *SKELETONS)
-
-
-@pytest.fixture(scope="module")
-def registry() -> Registry:
-    return discover()
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 
 from labcrane import ProtocolError
 from labcrane.protocol.study import load
-from labcrane.registry.registry import Registry, discover
+from labcrane.registry.registry import Registry
 
 ROOT = Path(__file__).parents[2]
 
@@ -37,11 +37,6 @@ sessions:
       - block: {task: aiming, repeat: 2}
       - break: {seconds: 10}
 """
-
-
-@pytest.fixture(scope="module")
-def registry() -> Registry:
-    return discover()
 
 
 @pytest.fixture

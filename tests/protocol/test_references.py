@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import matplotlib
 import pytest
-from rehearsal import SHORT
+from rehearsal import SHORT, said_of
 
 import labcrane
 from labcrane import ProtocolError, Settings
@@ -32,11 +32,6 @@ RETRIEVAL = (PROTOCOLS / "retrieval" / "protocol.yaml").read_text(encoding="utf-
 RETRIEVAL = "#\n#\n\n" + RETRIEVAL[RETRIEVAL.index("labcrane: 1") :]
 
 
-@pytest.fixture(scope="module")
-def registry() -> Registry:
-    return discover()
-
-
 @pytest.fixture
 def told(tmp_path: Path, registry: Registry):
     """Return what is said of a protocol beside the files of the shipped one, its name left out."""
@@ -45,13 +40,7 @@ def told(tmp_path: Path, registry: Registry):
         folder = tmp_path / study
         if not folder.exists():
             shutil.copytree(PROTOCOLS / study, folder)
-        path = folder / "protocol.yaml"
-        path.write_text(text, encoding="utf-8")
-        try:
-            load(path, registry)
-        except ProtocolError as error:
-            return str(error).replace(f"{path}:", "").splitlines()
-        return []
+        return said_of(folder / "protocol.yaml", text, registry)
 
     return tell
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labcrane.cli.options import AsJson, DataBeside, ProtocolHere, data_folder
+from labcrane.cli.options import AsJson, DataBeside, ProtocolHere, data_folder, study_of
 from labcrane.cli.output import out
 from labcrane.errors import LabcraneError
 
@@ -182,10 +182,8 @@ def plan(
     from labcrane.participants.products import product
     from labcrane.protocol.effective import written_quantities
     from labcrane.protocol.questions import key_of
-    from labcrane.protocol.study import load
-    from labcrane.registry.registry import discover
 
-    study = load(protocol, discover(study=protocol))
+    study = study_of(protocol)
     count = participants or study.protocol.participants.planned
     names = [participant] if participant else pseudonyms(study.protocol.participants.pattern, count)
     plans = [
@@ -227,9 +225,7 @@ def pages(
     from labcrane.design.plan import plan_session
     from labcrane.errors import PluginError
     from labcrane.files.pseudonyms import pseudonyms
-    from labcrane.protocol.study import load
     from labcrane.registry.offers import LAB, not_installed
-    from labcrane.registry.registry import discover
 
     if missing := not_installed({"nicegui": LAB}):
         raise PluginError(f"the preview of the pages {missing}")
@@ -238,7 +234,7 @@ def pages(
     from labcrane.web.preview import serve
     from labcrane.web.server.serving import HOST
 
-    study = load(protocol, discover(study=protocol))
+    study = study_of(protocol)
     study.check_session(session)
     name = participant or pseudonyms(study.protocol.participants.pattern, 1)[0]
     plan = plan_session(study, name, session)

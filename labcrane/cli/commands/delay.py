@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from labcrane.cli.options import study_of
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError
 
@@ -37,11 +38,9 @@ def measure_delay(
         Number of changes.
     """
     from labcrane.feedback.delays import delay_in_words, store
-    from labcrane.protocol.study import load
-    from labcrane.registry.registry import discover
 
     word, guide = WORDS[kind], GUIDES[kind]
-    study = load(protocol, discover(study=protocol))
+    study = study_of(protocol)
     there = list(study.views if kind == "display" else study.sounds)
     if name is None and len(there) == 1:
         name = there[0]

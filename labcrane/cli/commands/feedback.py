@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from labcrane.cli.options import ProtocolHere, stay_on_this_computer
+from labcrane.cli.options import ProtocolHere, stay_on_this_computer, study_of
 from labcrane.cli.output import out
 
 FILES = Path("preview")
@@ -35,10 +35,8 @@ def preview(
     stay_on_this_computer()
     from labcrane.feedback.player import play
     from labcrane.feedback.preview import chosen, write_preview
-    from labcrane.protocol.study import load
-    from labcrane.registry.registry import discover
 
-    study = load(protocol, discover(study=protocol))
+    study = study_of(protocol)
     shows = sys.platform != "linux" or bool(os.environ.get("DISPLAY"))
     if folder is None and shows:
         frames, scene = chosen(study, recording, session, trial)

@@ -15,6 +15,7 @@ from labcrane.cli.options import (
     data_in,
     protocol_in,
     stay_on_this_computer,
+    study_of,
 )
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError, RecordingError, nearest
@@ -88,10 +89,8 @@ def _monitors(protocol: Path | None) -> "MonitorBuilder":
 
     if protocol is None:
         return MonitorBuilder(MonitorConfig())
-    from labcrane.protocol.study import load
-    from labcrane.registry.registry import discover
 
-    study = load(protocol, discover(study=protocol))
+    study = study_of(protocol)
     chosen, folder = study.monitors, protocol.parent
     use = None if chosen is None else [one.described(folder) for one in chosen.values()]
     return MonitorBuilder(MonitorConfig(str(protocol), study.protocol.machine, use))

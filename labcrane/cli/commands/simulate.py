@@ -14,7 +14,7 @@ from labcrane.cli.commands.results import (
     cohort_of,
     progress_bar,
 )
-from labcrane.cli.options import ProtocolHere, stay_on_this_computer
+from labcrane.cli.options import ProtocolHere, stay_on_this_computer, study_of
 from labcrane.cli.output import out
 
 if TYPE_CHECKING:
@@ -51,10 +51,8 @@ def simulate(
     Participants who are in the folder already are kept: an interrupted run continues.
     """
     from labcrane.files.pseudonyms import pseudonyms
-    from labcrane.protocol.study import load
-    from labcrane.registry.registry import discover
 
-    study = load(protocol, discover(study=protocol))
+    study = study_of(protocol)
     count = participants or study.protocol.participants.planned
     names = pseudonyms(study.protocol.participants.pattern, count)
     simulate_all(protocol, folder, names, cohort, workers, scheduler)
@@ -155,13 +153,11 @@ def power(
     from labcrane.analysis.quality import is_result
     from labcrane.errors import ProtocolError
     from labcrane.files.pseudonyms import pseudonyms
-    from labcrane.protocol.study import load
-    from labcrane.registry.registry import discover
     from labcrane.simulation.power import read_effect
 
     tested, to_show, goals = read_effect(effect), _claim(claim, margin), _goals(goal)
     sizes = _sizes(participants)
-    study = load(protocol, discover(study=protocol))
+    study = study_of(protocol)
     if resimulate is not None and (recordings is not None or test != "t"):
         raise ProtocolError(
             "--resimulate is for the t test of new participants; it cannot be combined with "

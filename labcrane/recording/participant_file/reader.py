@@ -132,13 +132,10 @@ class Stream:
         cut, found = slice(start, stop), {}
         with reading(self._path) as file:
             for name in names:
-                dataset = file[self._time if name == "time" else self._paths[name]]
                 if name == "time":
-                    found[name] = np.asarray(dataset[cut], np.float64)
+                    found[name] = np.asarray(file[self._time][cut], np.float64)
                 else:
-                    found[name] = np.asarray(
-                        dataset.asstr("utf-8")[cut] if holds_texts(dataset) else dataset[cut]
-                    )
+                    found[name] = _cut(file[self._paths[name]], cut)
         return found
 
     def values(
@@ -149,13 +146,7 @@ class Stream:
         Unlike in :meth:`columns`, ``"time"`` is the channel that a source calls so.
         """
         with reading(self._path) as file:
-            chosen = {name: file[self._paths[name]] for name in names}
-            return {
-                name: np.asarray(
-                    each.asstr("utf-8")[start:stop] if holds_texts(each) else each[start:stop]
-                )
-                for name, each in chosen.items()
-            }
+            return {name: _cut(file[self._paths[name]], slice(start, stop)) for name in names}
 
     @cached_property
     def numeric(self) -> list[str]:
@@ -201,10 +192,7 @@ class Stream:
             chosen |= {name: file[self._paths[name]] for name in wanted}
             for at in range(first, max(last, first + 1), rows):
                 cut = slice(at, min(at + rows, last))
-                arrays = [
-                    pa.array(each.asstr("utf-8")[cut] if holds_texts(each) else each[cut])
-                    for each in chosen.values()
-                ]
+                arrays = [pa.array(_cut(each, cut)) for each in chosen.values()]
                 yield pa.record_batch(arrays, names=list(chosen))
 
     def table(
@@ -324,6 +312,14 @@ class SessionRecord:
             group = file[self._group].get(name, {})
             return pd.DataFrame({column: _values(group[column]) for column in group})
 
+    def _table_in_order(self, name: str) -> "pd.DataFrame":
+        """Return a group of columns by their names, in the order of their recording."""
+        import pandas as pd  # noqa: PLC0415
+
+        with reading(self._path) as file:
+            columns = _columns(file[f"{self._group}/{name}"])
+            return pd.DataFrame({label: _values(dataset) for label, dataset in columns})
+
     @cached_property
     def events(self) -> "pd.DataFrame":
         """One row per event: time, tick, part, trial, name and data, a dict."""
@@ -368,11 +364,7 @@ class SessionRecord:
     @cached_property
     def trials(self) -> "pd.DataFrame":
         """One row per counted trial: its condition and its results."""
-        import pandas as pd  # noqa: PLC0415
-
-        with reading(self._path) as file:
-            columns = _columns(file[f"{self._group}/trials"])
-            return pd.DataFrame({name: _values(dataset) for name, dataset in columns})
+        return self._table_in_order("trials")
 
     @cached_property
     def questionnaires(self) -> "pd.DataFrame":
@@ -380,11 +372,7 @@ class SessionRecord:
 
         ``kind`` is ``answer`` or ``score``. A declined answer has neither text nor value.
         """
-        import pandas as pd  # noqa: PLC0415
-
-        with reading(self._path) as file:
-            columns = _columns(file[f"{self._group}/questionnaires"])
-            return pd.DataFrame({name: _values(dataset) for name, dataset in columns})
+        return self._table_in_order("questionnaires")
 
     @cached_property
     def protocol(self) -> str:
@@ -516,6 +504,10 @@ def _columns(group: "h5py.Group") -> list[tuple[str, "h5py.Dataset"]]:
         name = str(dataset.attrs.get("name", path))
         columns[path if name in columns else name] = dataset  # labels of others may not differ
     return list(columns.items())
+
+
+def _cut(dataset: "h5py.Dataset", cut: slice) -> npt.NDArray[Any]:
+    return np.asarray(dataset.asstr("utf-8")[cut] if holds_texts(dataset) else dataset[cut])
 
 
 def _values(dataset: "h5py.Dataset") -> Any:
