@@ -32,7 +32,7 @@ from labcrane.analysis.sticks import (
     steering_entropy,
     stick_use,
 )
-from labcrane.analysis.tables.body import MEASURED, BodySignals
+from labcrane.analysis.tables.body import BodySignals
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.analysis.tables.measure_cache import kept
 from labcrane.analysis.tables.responses import STIMULUS, in_trials, responses
@@ -204,7 +204,6 @@ def measure_session(
                 seen, due[0], due[span.start], due[span.stop - 1], settings.look_least_s,
                 movement.pauses,
             )  # fmt: skip
-        row |= dict.fromkeys(MEASURED, float("nan"))
         if span is not None:
             due = movement.due
             row |= body.measures(due[span.start], due[span.stop - 1], movement.pauses)
@@ -249,7 +248,7 @@ def _sequence(trials: "pd.DataFrame") -> "pd.Series[Any]":
 
 
 def measure(movement: Movement, machine: Machine, settings: MeasureSettings) -> dict[str, float]:
-    """Return the measures of one movement; NaN where it has no onset or no offset."""
+    """Return all measures of one movement; NaN where it has no onset, no offset, or no sticks."""
     span = movement.span
     nothing = {name: float("nan") for name in MEASURES if name not in {"sequence", "position"}}
     errors = {
@@ -262,7 +261,7 @@ def measure(movement: Movement, machine: Machine, settings: MeasureSettings) -> 
         return nothing | errors
     speed, tip = movement.speed[span], movement.tip[span]
     smooth = low_pass(movement.tip, movement.rate_hz, settings.low_pass_hz)
-    return {
+    return nothing | {
         **errors,
         **_strokes(movement, span),
         "amplitude": _along(movement, tip),
@@ -290,32 +289,12 @@ def _strokes(movement: Movement, span: slice) -> dict[str, float]:
     threshold, hold_s = movement.result("onset_speed"), movement.result("onset_hold")
     if np.isnan(threshold):  # of a task that does not say what a halt is
         return {}
-    found = halts(movement.elapsed[span], movement.speed[span], threshold=threshold, hold_s=hold_s)
-    return {
-        "halts": found.count,
-        "halt_time": found.seconds,
-        "main_stroke_time": found.main_stroke_s,
-    }
+    return halts(movement.elapsed[span], movement.speed[span], threshold=threshold, hold_s=hold_s)
 
 
 def _along(movement: Movement, tip: FloatArray) -> float:
     axis = movement.point("target") - movement.point("start")
     return float((tip[-1] - tip[0]) @ axis / np.linalg.norm(axis))
-
-
-OF_STICKS = (
-    "reversals",
-    "simultaneous",
-    "axes_used",
-    "bimanual",
-    "duty_cycle",
-    "aggressiveness",
-    "stick_power",
-    "stick_centroid",
-    "stick_step",
-    "stick_least",
-)
-"""Measures of sticks, whatever their number."""
 
 
 def _axes(movement: Movement, span: slice, settings: MeasureSettings) -> dict[str, FloatArray]:
@@ -336,27 +315,19 @@ def _errors(movement: Movement, settings: MeasureSettings) -> FloatArray:
 def _sticks(movement: Movement, span: slice, settings: MeasureSettings) -> dict[str, float]:
     axes = _axes(movement, span, settings)
     if not axes:  # keys, or a panel whose axes are called otherwise
-        return dict.fromkeys(OF_STICKS, float("nan"))
+        return {}
     seconds = (span.stop - span.start) / movement.rate_hz
-    use = stick_use(axes, settings.dead_zone)
-    worked = inceptor_use(
-        axes,
-        movement.rate_hz,
-        window_s=settings.rate_window_s,
-        least_rate=settings.moving_rate,
-        highest_hz=settings.stick_highest_hz,
-    )
     step, least = resolution(axes)
-    turns = sum(reversals(values, settings.hysteresis) for values in axes.values())
     found = {
-        "reversals": turns / seconds,
-        "simultaneous": use.simultaneous,
-        "axes_used": use.axes,
-        "bimanual": use.bimanual,
-        "duty_cycle": worked.duty_cycle,
-        "aggressiveness": worked.aggressiveness,
-        "stick_power": worked.power,
-        "stick_centroid": worked.centroid,
+        "reversals": sum(reversals(each, settings.hysteresis) for each in axes.values()) / seconds,
+        **stick_use(axes, settings.dead_zone),
+        **inceptor_use(
+            axes,
+            movement.rate_hz,
+            window_s=settings.rate_window_s,
+            least_rate=settings.moving_rate,
+            highest_hz=settings.stick_highest_hz,
+        ),
         "stick_step": step,
         "stick_least": least,
     }

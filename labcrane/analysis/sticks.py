@@ -1,35 +1,17 @@
 """Stick measures: how the operator used the sticks."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from labcrane.types import FloatArray
 
 
-@dataclass(frozen=True, slots=True)
-class StickUse:
-    """How sticks were used during a movement.
+def stick_use(axes: Mapping[str, FloatArray], dead_zone: float) -> dict[str, float]:
+    """Return how sticks were used: ``simultaneous``, ``axes_used`` and ``bimanual``.
 
-    Attributes
-    ----------
-    simultaneous
-        Fraction of the time with two or more axes beyond the dead zone.
-    axes
-        Mean number of axes beyond it. The measure of forestry's "functions used simultaneously"
-        (Polowy & Rutkowski 2024, Forests 15:1277).
-    bimanual
-        Of the time with any stick in use, the fraction with more than one; NaN when none was.
-    """
-
-    simultaneous: float
-    axes: float
-    bimanual: float
-
-
-def stick_use(axes: Mapping[str, FloatArray], dead_zone: float) -> StickUse:
-    """Return how sticks were used.
+    The number of axes is the measure of forestry's "functions used simultaneously" (Polowy &
+    Rutkowski 2024, Forests 15:1277). ``bimanual`` is NaN when no stick was in use.
 
     Parameters
     ----------
@@ -49,11 +31,11 @@ def stick_use(axes: Mapping[str, FloatArray], dead_zone: float) -> StickUse:
         axis=0,
     )
     any_use = int((hands > 0).sum())
-    return StickUse(
-        simultaneous=float((count > 1).mean()),
-        axes=float(count.mean()),
-        bimanual=float((hands > 1).sum() / any_use) if any_use else float("nan"),
-    )
+    return {
+        "simultaneous": float((count > 1).mean()),
+        "axes_used": float(count.mean()),
+        "bimanual": float((hands > 1).sum() / any_use) if any_use else float("nan"),
+    }
 
 
 def reversals(axis: FloatArray, hysteresis: float) -> int:
@@ -162,33 +144,6 @@ def stick_rates(axis: FloatArray, rate_hz: float, window_s: float) -> FloatArray
     return rates
 
 
-@dataclass(frozen=True, slots=True)
-class InceptorUse:
-    """How much a pilot or operator works a stick.
-
-    Attributes
-    ----------
-    duty_cycle
-        Fraction of the time in which any axis moves faster than a limit. After the duty cycle of
-        pilot inceptor workload (Hanson et al. 2014, NASA/TM, Complexity and pilot workload metrics
-        for the evaluation of adaptive flight controls on a full scale piloted aircraft), with the
-        rate of :func:`stick_rates`.
-    aggressiveness
-        Root mean square of the rate of all axes together, in full scales per second. After the
-        aggressiveness of the same report, which measures deflection and rate in its own units.
-    power
-        Variance of all axes together up to the highest frequency.
-    centroid
-        Mean frequency of that power in Hz; NaN where nothing moves, or where the sampling rate is
-        less than twice the highest frequency.
-    """
-
-    duty_cycle: float
-    aggressiveness: float
-    power: float
-    centroid: float
-
-
 def inceptor_use(
     axes: Mapping[str, FloatArray],
     rate_hz: float,
@@ -196,8 +151,14 @@ def inceptor_use(
     window_s: float,
     least_rate: float,
     highest_hz: float,
-) -> InceptorUse:
-    """Return how much the sticks were worked.
+) -> dict[str, float]:
+    """Return how much the sticks were worked: duty cycle, aggressiveness, power and centroid.
+
+    Duty cycle and aggressiveness are after those of pilot inceptor workload (Hanson et al. 2014,
+    NASA/TM, Complexity and pilot workload metrics for the evaluation of adaptive flight controls
+    on a full scale piloted aircraft), with the rate of :func:`stick_rates`. That report measures
+    deflection and rate in its own units. The centroid is NaN where nothing moves, and power and
+    centroid where the sampling rate is less than twice the highest frequency.
 
     Parameters
     ----------
@@ -213,12 +174,12 @@ def inceptor_use(
     values = np.array(list(axes.values()))
     rates = np.array([stick_rates(each, rate_hz, window_s) for each in values])
     power, centroid = _spectrum(values, rate_hz, highest_hz)
-    return InceptorUse(
-        duty_cycle=float((np.abs(rates) > least_rate).any(axis=0).mean()),
-        aggressiveness=float(np.sqrt((rates**2).sum(axis=0).mean())),
-        power=power,
-        centroid=centroid,
-    )
+    return {
+        "duty_cycle": float((np.abs(rates) > least_rate).any(axis=0).mean()),
+        "aggressiveness": float(np.sqrt((rates**2).sum(axis=0).mean())),
+        "stick_power": power,
+        "stick_centroid": centroid,
+    }
 
 
 def _spectrum(values: FloatArray, rate_hz: float, highest_hz: float) -> tuple[float, float]:

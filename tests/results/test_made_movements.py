@@ -64,9 +64,9 @@ def test_halts_are_those_that_were_made_however_noisy_the_sensors(rate_hz: float
         # A halt about as long as the hold may be one or none.
         surely, maybe = lasted[lasted > HOLD_S + 0.06], lasted[lasted > HOLD_S - 0.06]
         slack = (1.0 / rate_hz + 0.03) * max(len(maybe), 1)
-        assert len(surely) <= found.count <= len(maybe)
-        assert surely.sum() - slack < found.seconds < maybe.sum() + slack
-        assert 0.0 < found.main_stroke_s < seen.results["movement_time"]
+        assert len(surely) <= found["halts"] <= len(maybe)
+        assert surely.sum() - slack < found["halt_time"] < maybe.sum() + slack
+        assert 0.0 < found["main_stroke_time"] < seen.results["movement_time"]
         made_halts += len(surely)
     assert made_halts > 10
 
@@ -82,8 +82,8 @@ def test_noise_of_the_sensors_adds_four_percent_to_a_way_at_most(rate_hz: float)
 def test_one_stroke_without_a_halt_is_its_own_main_stroke() -> None:
     time = np.arange(0.0, 1.0, 0.01)
     found = halts(time, np.full(100, 0.5), threshold=0.02, hold_s=0.1)
-    assert (found.count, found.seconds) == (0, 0.0)
-    assert found.main_stroke_s == pytest.approx(0.99)
+    assert (found["halts"], found["halt_time"]) == (0, 0.0)
+    assert found["main_stroke_time"] == pytest.approx(0.99)
 
 
 def test_halts_and_strokes_are_counted_to_the_sample() -> None:
@@ -95,9 +95,9 @@ def test_halts_and_strokes_are_counted_to_the_sample() -> None:
     speed[18] = 0.4  # a tick that is no stroke
     speed[22:26] = 0.2  # the last, from 2.2 to 2.6 s; then rest
     found = halts(time, speed, threshold=0.02, hold_s=0.2)
-    assert found.count == 2
-    assert found.seconds == pytest.approx(0.3 + 0.6)
-    assert found.main_stroke_s == pytest.approx(0.8)
+    assert found["halts"] == 2
+    assert found["halt_time"] == pytest.approx(0.3 + 0.6)
+    assert found["main_stroke_time"] == pytest.approx(0.8)
 
 
 @pytest.mark.parametrize("halting", [True, False])

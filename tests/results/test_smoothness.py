@@ -106,10 +106,10 @@ def test_stick_use_counts_axes_and_hands() -> None:
     on, off = np.ones(10), np.zeros(10)
     half = np.r_[np.ones(5), np.zeros(5)]
     use = stick_use({"left.x": on, "left.y": half, "right.x": half, "right.y": off}, 0.05)
-    assert (use.simultaneous, use.axes, use.bimanual) == (0.5, 2.0, 0.5)
+    assert (use["simultaneous"], use["axes_used"], use["bimanual"]) == (0.5, 2.0, 0.5)
     still = stick_use({"left.x": off, "right.x": off}, 0.05)
-    assert still.simultaneous == 0.0
-    assert math.isnan(still.bimanual)
+    assert still["simultaneous"] == 0.0
+    assert math.isnan(still["bimanual"])
 
 
 def test_the_lag_of_two_hands_is_found() -> None:

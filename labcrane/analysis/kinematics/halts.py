@@ -1,7 +1,5 @@
 """Halts of a movement, and the main stroke between them."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from labcrane.types import FloatArray
@@ -10,30 +8,15 @@ ROUNDING_S = 1e-9
 """Elapsed times are sums of whole ticks."""
 
 
-@dataclass(frozen=True, slots=True)
-class Halts:
-    """The strokes of a movement.
-
-    Attributes
-    ----------
-    count, seconds
-        Halts between onset and offset, and their total duration, in s.
-    main_stroke_s
-        Of the stroke with the highest speed, from the halt or the rest before it to that behind it,
-        in s; 0 where no stroke is long enough.
-    """
-
-    count: int
-    seconds: float
-    main_stroke_s: float
-
-
-def halts(elapsed: FloatArray, speed: FloatArray, *, threshold: float, hold_s: float) -> Halts:
-    """Return the halts of a movement.
+def halts(
+    elapsed: FloatArray, speed: FloatArray, *, threshold: float, hold_s: float
+) -> dict[str, float]:
+    """Return the halts of a movement: ``halts``, ``halt_time`` and ``main_stroke_time``.
 
     In a stroke the tip is faster than ``threshold`` for at least ``hold_s``, as at an onset; a halt
     is at least ``hold_s`` between two strokes. So noise that passes the threshold briefly makes
-    no halt and ends none. The final rest of a movement is not a halt, and belongs to no stroke.
+    no halt and ends none. The final rest of a movement is not a halt, and belongs to no stroke. The
+    main stroke, the one with the highest speed, takes 0 s where none is long enough.
 
     Parameters
     ----------
@@ -51,8 +34,8 @@ def halts(elapsed: FloatArray, speed: FloatArray, *, threshold: float, hold_s: f
     begins = np.concatenate([strokes[:1, 0], strokes[1:, 0][held]])
     ends = np.concatenate([strokes[:-1, 1][held], strokes[-1:, 1]])
     main = (begins <= elapsed[np.argmax(speed)]).nonzero()[0][-1:]
-    return Halts(
-        count=int(held.sum()),
-        seconds=float(gaps[held].sum()),
-        main_stroke_s=float((ends[main] - begins[main]).sum()),
-    )
+    return {
+        "halts": int(held.sum()),
+        "halt_time": float(gaps[held].sum()),
+        "main_stroke_time": float((ends[main] - begins[main]).sum()),
+    }
