@@ -1,6 +1,6 @@
 """Cohort of a data folder: its participants, and who is included."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
@@ -87,6 +87,16 @@ class Participant:
         for number in self.usable:
             yield number, recording.session(number)
 
+    def rows(
+        self, of: Callable[[SessionRecord], Iterable[Mapping[str, Any]]]
+    ) -> list[dict[str, Any]]:
+        """Return the rows of a table of each session, with the participant and the session."""
+        return [
+            {"participant": self.name, "session": number, **row}
+            for number, session in self.sessions()
+            for row in of(session)
+        ]
+
     @cached_property
     def usable(self) -> tuple[int, ...]:
         """Numbers of the sessions that contain data: one may have ended before its first tick."""
@@ -167,8 +177,6 @@ def find_cohort(
 
     Parameters
     ----------
-    folder
-        The study's data folder.
     include
         Statuses to be used as well: simulated, pilot, half-finished.
     struck
@@ -271,41 +279,50 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
     path = participant_path(folder)
     if struck is not None:
         return Participant(folder.name, path, *struck)
-    if not path.exists():
-        why = (
-            "its session is still running, or was killed: labcrane resume "
-            f"{DataFolder.options(folder.name)} continues it, and labcrane recover {folder} builds "
-            "the participant file from what was recorded"
-            if any(folder.glob("ses-*_run*.xdf"))
-            else "its session did not start: only external streams are recorded; labcrane run "
-            f"{DataFolder.options(folder.name)} begins it"
-        )
-        return Participant(folder.name, path, Status.UNREADABLE, why)
+    status, kind, study = Status.UNREADABLE, None, ""
     try:
-        if behind := backlog(path):
-            return Participant(folder.name, path, Status.UNREADABLE, "; ".join(behind.values()))
-        recording = Recording(path)
-        if not recording.sessions:
-            return Participant(folder.name, path, Status.UNREADABLE, "holds no session")
-        hollow = [_hollow(number, recording.session(number)) for number in recording.sessions]
-        if None not in hollow:
-            return Participant(folder.name, path, Status.UNREADABLE, str(hollow[0]))
-        if recording.participant != folder.name:
-            why = (
-                f"says that it is of {recording.participant}: a copy, or in the wrong folder; "
-                f"remove it, or name its folder {recording.participant}"
-            )
-            return Participant(folder.name, path, Status.UNREADABLE, why)
-        contexts = {number: recording.session(number).context for number in recording.sessions}
-        if stranger := _stranger(folder.name, contexts):
-            return Participant(folder.name, path, Status.UNREADABLE, stranger)
-        study = next((str(each["study"]) for each in contexts.values() if "study" in each), "")
-        status, why, kind = _judge(recording, folder.name)
+        if not (why := _unusable(folder, path)):
+            recording = Recording(path)
+            sessions = {number: recording.session(number) for number in recording.sessions}
+            status, why, kind = _judge(sessions, folder.name)
+            contexts = (session.context for session in sessions.values())
+            study = next((str(each["study"]) for each in contexts if "study" in each), "")
     except StorageError:  # nothing is known of the file
         raise
     except (RecordingError, ProtocolError) as error:  # of the file, of the protocol in it
-        return Participant(folder.name, path, Status.UNREADABLE, str(error))
+        why = str(error)
     return Participant(folder.name, path, status, why, kind=kind, study=study)
+
+
+def _unusable(folder: Path, path: Path) -> str:
+    """Return why nothing of a participant can be used; empty if something can."""
+    if not path.exists():
+        options = DataFolder.options(folder.name)
+        if any(folder.glob("ses-*_run*.xdf")):
+            return (
+                f"its session is still running, or was killed: labcrane resume {options} continues "
+                f"it, and labcrane recover {folder} builds the participant file from what was "
+                "recorded"
+            )
+        return (
+            "its session did not start: only external streams are recorded; labcrane run "
+            f"{options} begins it"
+        )
+    if behind := backlog(path):
+        return "; ".join(behind.values())
+    recording = Recording(path)
+    sessions = {number: recording.session(number) for number in recording.sessions}
+    if not sessions:
+        return "holds no session"
+    hollow = [_hollow(number, session) for number, session in sessions.items()]
+    if None not in hollow:
+        return str(hollow[0])
+    if recording.participant != folder.name:
+        return (
+            f"says that it is of {recording.participant}: a copy, or in the wrong folder; "
+            f"remove it, or name its folder {recording.participant}"
+        )
+    return _stranger(folder.name, {number: each.context for number, each in sessions.items()})
 
 
 def _stranger(name: str, contexts: Mapping[int, Mapping[str, Any]]) -> str:
@@ -336,9 +353,8 @@ def kinds_of(participants: Iterable[Participant]) -> str:
     return " and ".join(named)
 
 
-def _judge(recording: Recording, name: str) -> tuple[Status, str, Status | None]:
+def _judge(sessions: Mapping[int, SessionRecord], name: str) -> tuple[Status, str, Status | None]:
     """Return the status, the reason for it, and the kind of the sessions."""
-    sessions = {number: recording.session(number) for number in recording.sessions}
     kind, stamp = _kind(sessions)
     why = _incomplete(sessions, name)
     if why is not None:

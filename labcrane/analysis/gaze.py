@@ -121,8 +121,6 @@ def looks(
 
     Parameters
     ----------
-    session
-        A recorded session.
     delay_s
         Of the display, for a stream of positions in the window: as in
         :func:`looks_on_screen`. With 0, a picture is seen as soon as it is handed to the screen.
@@ -238,40 +236,18 @@ def looks_on_screen(
     return Looks(time, area, tracked, names)
 
 
-@dataclass(frozen=True, slots=True)
-class Drift:
-    """Offset of the measured gaze from a fixation target.
-
-    Attributes
-    ----------
-    right_deg, down_deg
-        The median offset, in degrees of visual angle: its parts to the right and downwards, as seen
-        by a person who looks straight at the target.
-    spread_deg
-        Median distance of the samples from that, in degrees: the precision.
-    """
-
-    right_deg: float
-    down_deg: float
-    spread_deg: float
-
-    @property
-    def deg(self) -> float:
-        """The offset's size, in degrees: the angle between the two lines of sight."""
-        return math.hypot(self.right_deg, self.down_deg)
-
-
 def drift(
     gaze: FloatArray,
     target: tuple[float, float],
     centre: tuple[float, float],
     px_per_m: float,
     viewing_m: float,
-) -> Drift:
+) -> dict[str, float]:
     """Return how far gaze is from a fixation target, as angles at the eye.
 
-    The eye is in front of the screen's ``centre``. Medians: a blink's edge or a short look away
-    moves them little.
+    They are ``right_deg``, ``down_deg``, ``deg`` and ``spread_deg`` of :data:`FIXATIONS`, the
+    directions as seen by a person who looks straight at the target. The eye is in front of the
+    screen's ``centre``. Medians: a blink's edge or a short look away moves them little.
 
     Parameters
     ----------
@@ -305,8 +281,12 @@ def drift(
     angle = np.degrees(np.arctan2(sine, seen @ ray))
     away = aside * (angle / np.where(sine > 0.0, sine, 1.0))[:, None]
     right, down = np.median(away, axis=0).tolist()
-    spread = float(np.median(np.hypot(away[:, 0] - right, away[:, 1] - down)))
-    return Drift(right, down, spread)
+    return {
+        "right_deg": right,
+        "down_deg": down,
+        "deg": math.hypot(right, down),
+        "spread_deg": float(np.median(np.hypot(away[:, 0] - right, away[:, 1] - down))),
+    }
 
 
 FIXATIONS: Mapping[str, tuple[str, str]] = {
@@ -356,54 +336,34 @@ class Glass:
         return across * self.size[0], down * self.size[1]
 
 
-def fixations(session: SessionRecord, settled_s: float = SETTLED_S) -> "pd.DataFrame":
+def fixations(session: SessionRecord) -> "pd.DataFrame":
     """Return how far gaze was from each point of the session's checks of the eye tracker.
 
-    One row for each point that was shown for its whole time: ``step`` and ``point``, counted from
-    1; ``time`` on our clock, in seconds; ``right_deg``, ``down_deg``, ``deg`` and ``spread_deg`` as
-    in :class:`Drift`, NaN where the picture's size or the eye's distance was not given;
-    ``right_px`` and ``down_px``, the median offset in pixels; ``valid``, the share of samples in
-    which gaze is known. No row without an operator's view, or without exactly one gaze stream in
-    pixels of the window.
-
-    Parameters
-    ----------
-    session
-        A recorded session.
-    settled_s
-        Time that is left out after a point appears, in seconds: the eye moves to it.
+    One row of :data:`FIXATIONS` for each point that was shown for its whole time. Offsets in
+    degrees are NaN where the picture's size or the eye's distance was not given. No row without an
+    operator's view, or without exactly one gaze stream in pixels of the window.
     """
     import pandas as pd
 
-    gaze = window_stream(session)
-    shown = list(_shown(session))
-    rows = []
-    if gaze is not None and shown:
-        spots, time = window_gaze(session, gaze).spots(), gaze.time
-        for point in shown:
-            held = (time >= point.began + settled_s) & (time < point.over)
-            found = _offset(spots[held], point.at, point.glass)
-            rows.append((point.step, point.number, point.began, *found))
-    return pd.DataFrame(rows, columns=list(FIXATIONS))
+    return pd.DataFrame(_points(session), columns=list(FIXATIONS))
 
 
-@dataclass(frozen=True, slots=True)
-class ShownPoint:
-    """A point that was shown for its whole time: where, in pixels, and from when to when."""
+def fixations_of(participant: Participant) -> "pd.DataFrame":
+    """Return :func:`fixations` of all sessions, each row with its participant and session."""
+    import pandas as pd
 
-    step: int
-    number: int
-    began: float
-    over: float
-    at: tuple[float, float]
-    glass: Glass
+    columns = ["participant", "session", *FIXATIONS]
+    return pd.DataFrame(participant.rows(_points), columns=columns)
 
 
-def _shown(session: SessionRecord) -> Iterator[ShownPoint]:
-    """Yield the points of a session that were shown for their whole time."""
+def _points(session: SessionRecord) -> Iterator[dict[str, float]]:
+    """Yield the rows of :func:`fixations`."""
+    gaze, events = window_stream(session), session.events
+    if gaze is None or not (events["name"] == "fixation.over").any():
+        return
+    spots, seen = window_gaze(session, gaze).spots(), gaze.time
     step, began, glass = 0, 0.0, None
     point: Mapping[str, Any] = {}
-    events = session.events
     for name, time, data in zip(events["name"], events["time"], events["data"], strict=True):
         match name:
             case "feedback.ready":
@@ -413,21 +373,10 @@ def _shown(session: SessionRecord) -> Iterator[ShownPoint]:
             case "fixation.shown":
                 began, point = float(time), data
             case "fixation.over" if data["done"] and point and glass is not None:
+                held = (seen >= began + SETTLED_S) & (seen < float(time))
                 at = glass.pixel(float(point["x"]), float(point["y"]))
-                yield ShownPoint(step, int(point["point"]), began, float(time), at, glass)
-
-
-def fixations_of(participant: Participant) -> "pd.DataFrame":
-    """Return :func:`fixations` of all sessions, each row with its participant and session."""
-    import pandas as pd
-
-    tables = [
-        fixations(session).assign(participant=participant.name, session=number)
-        for number, session in participant.sessions()
-    ]
-    filled = [table for table in tables if len(table)]
-    found = pd.concat(filled, ignore_index=True) if filled else tables[0]
-    return found[["participant", "session", *FIXATIONS]]
+                about = {"step": step, "point": int(point["point"]), "time": began}
+                yield about | _offset(spots[held], at, glass)
 
 
 def glass_of(session: SessionRecord) -> Glass | None:
@@ -454,19 +403,17 @@ def _glass(facts: str) -> Glass | None:
     )
 
 
-def _offset(spots: FloatArray, at: tuple[float, float], glass: Glass) -> tuple[float, ...]:
-    """Return a row's offsets in degrees and pixels, and the share of samples that are numbers."""
+def _offset(spots: FloatArray, at: tuple[float, float], glass: Glass) -> dict[str, float]:
+    """Return the share of samples that are numbers and, as far as known, a row's offsets."""
     there = np.isfinite(spots).all(axis=1)
-    valid = float(there.mean()) if len(spots) else 0.0
     if not there.any():
-        return (*(math.nan,) * 6, valid)
+        return {"valid": 0.0}
     right, down = (np.median(spots[there], axis=0) - at).tolist()
-    if not math.isfinite(glass.px_per_m + glass.viewing_m):
-        return (*(math.nan,) * 4, right, down, valid)
-    middle = (glass.size[0] / 2.0, glass.size[1] / 2.0)
-    angle = drift(spots, at, middle, glass.px_per_m, glass.viewing_m)
-    angles = (angle.right_deg, angle.down_deg, angle.deg, angle.spread_deg)
-    return (*angles, right, down, valid)
+    found = {"valid": float(there.mean()), "right_px": right, "down_px": down}
+    if math.isfinite(glass.px_per_m + glass.viewing_m):
+        middle = (glass.size[0] / 2.0, glass.size[1] / 2.0)
+        found |= drift(spots, at, middle, glass.px_per_m, glass.viewing_m)
+    return found
 
 
 def area_name(value: object) -> str:

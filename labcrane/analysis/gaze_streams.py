@@ -74,9 +74,9 @@ def gaze_stream(session: SessionRecord, name: str = "") -> Stream | None:
     return found[0] if len(found) == 1 else None
 
 
-def window_stream(session: SessionRecord, name: str = "") -> Stream | None:
+def window_stream(session: SessionRecord) -> Stream | None:
     """Return the gaze stream in pixels of the window; None for none or several."""
-    found = [each for each in _gaze(session) if in_window(each) and name in ("", each.name)]
+    found = [each for each in _gaze(session) if in_window(each)]
     return found[0] if len(found) == 1 else None
 
 

@@ -1,6 +1,6 @@
 """Quality of loop and clocks, one row per session and per stream."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,6 +9,7 @@ from labcrane.analysis.cohort import Participant
 from labcrane.analysis.presented import in_words, not_presented
 from labcrane.core.findings import Verdict, worst
 from labcrane.errors import RecordingError, shortened
+from labcrane.recording.participant_file.reader import SessionRecord
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,30 +35,25 @@ def loop_quality(participant: Participant) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    rows = []
-    for number, session in participant.sessions():
-        loop = session.streams["loop"].columns(("woke", "due", "wrote", "paused"))
-        lateness = loop["woke"] - loop["due"]
-        wrote = loop["wrote"]
-        rate_hz = float(session.attrs["rate_hz"])
-        rows.append(
-            {
-                "participant": participant.name,
-                "session": number,
-                "clock": session.attrs.get("clock", ""),
-                "sync_verdict": verdict_of_stamps(session.sync_report),
-                "not_there": ", ".join(session.sync_report.get("absent", ())),
-                "ticks": len(wrote),
-                "rate_hz": rate_hz,
-                "lateness_median_ms": 1e3 * float(np.median(lateness)),
-                "lateness_p99_ms": 1e3 * float(np.quantile(lateness, 0.99)),
-                "lateness_worst_ms": 1e3 * float(lateness.max()),
-                "late_ticks": int((lateness > 1.0 / rate_hz).sum()),
-                "paused_s": float(loop["paused"].sum() / rate_hz),
-                "write_worst_ms": 1e3 * float(wrote.max()),
-            }
-        )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(participant.rows(lambda session: [_loop(session)]))
+
+
+def _loop(session: SessionRecord) -> dict[str, Any]:
+    loop = session.streams["loop"].columns(("woke", "due", "wrote", "paused"))
+    lateness, rate_hz = loop["woke"] - loop["due"], float(session.attrs["rate_hz"])
+    return {
+        "clock": session.attrs.get("clock", ""),
+        "sync_verdict": verdict_of_stamps(session.sync_report),
+        "not_there": ", ".join(session.sync_report.get("absent", ())),
+        "ticks": len(lateness),
+        "rate_hz": rate_hz,
+        "lateness_median_ms": 1e3 * float(np.median(lateness)),
+        "lateness_p99_ms": 1e3 * float(np.quantile(lateness, 0.99)),
+        "lateness_worst_ms": 1e3 * float(lateness.max()),
+        "late_ticks": int((lateness > 1.0 / rate_hz).sum()),
+        "paused_s": float(loop["paused"].sum() / rate_hz),
+        "write_worst_ms": 1e3 * float(loop["wrote"].max()),
+    }
 
 
 def sync_quality(participant: Participant) -> "pd.DataFrame":
@@ -68,24 +64,16 @@ def sync_quality(participant: Participant) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    rows: list[dict[str, Any]] = []
-    for number, session in participant.sessions():
-        for name, stream in session.streams.items():
-            if "corrected" not in stream.attrs:
-                continue  # our own: one clock
-            about = {key: value for key, value in stream.attrs.items() if key != "name"}
+    return pd.DataFrame(participant.rows(_clocks))
+
+
+def _clocks(session: SessionRecord) -> Iterator[dict[str, Any]]:
+    for name, stream in session.streams.items():
+        about = {key: value for key, value in stream.attrs.items() if key != "name"}
+        if "corrected" in about:  # others are our own: one clock
             corrected = "yes" if about.pop("corrected") else "no"
-            rows.append(
-                {
-                    "participant": participant.name,
-                    "session": number,
-                    "stream": name,
-                    "corrected": corrected,
-                    "samples": len(stream.time),
-                    **about,
-                }
-            )
-    return pd.DataFrame(rows)
+            samples = len(stream.time)
+            yield {"stream": name, "corrected": corrected, "samples": samples, **about}
 
 
 def loop_backs(participant: Participant) -> "pd.DataFrame":
@@ -97,25 +85,26 @@ def loop_backs(participant: Participant) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    rows = []
-    for number, session in participant.sessions():
-        for one in session.sync_report.get("loop_back", ()):
-            delay = one["delay"] or {}
-            times = {"delay": "mean_s", "delay_sd": "sd_s"}
-            known = {name: delay.get(key) for name, key in times.items()}
-            known |= {"growth": one["moved_s"], "stated": one["stated_s"]}
-            known["declared_lag"] = one.get("declared_s")
-            rows.append(
-                {
-                    "participant": participant.name,
-                    "session": number,
-                    **{name: one[name] for name in ("stream", "channel", "of", "verdict")},
-                    "seen": delay.get("seen", 0),
-                    "changes": delay.get("asked", 0),
-                    **{f"{k}_ms": None if v is None else 1e3 * v for k, v in known.items()},
-                }
-            )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(
+        participant.rows(lambda session: map(_loop_back, session.sync_report.get("loop_back", ())))
+    )
+
+
+def _loop_back(one: Mapping[str, Any]) -> dict[str, Any]:
+    delay = one["delay"] or {}
+    seconds = {
+        "delay": delay.get("mean_s"),
+        "delay_sd": delay.get("sd_s"),
+        "growth": one["moved_s"],
+        "stated": one["stated_s"],
+        "declared_lag": one.get("declared_s"),
+    }
+    return {
+        **{name: one[name] for name in ("stream", "channel", "of", "verdict")},
+        "seen": delay.get("seen", 0),
+        "changes": delay.get("asked", 0),
+        **{f"{name}_ms": None if s is None else 1e3 * s for name, s in seconds.items()},
+    }
 
 
 def unprobed(participants: Iterable[Participant]) -> list[str]:

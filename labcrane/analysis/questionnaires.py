@@ -64,6 +64,11 @@ class Occasion:
     handed_in: bool = False
     ended: float = np.nan
 
+    @property
+    def silent(self) -> str:
+        """Reason for an answer or score that is missing."""
+        return OMITTED if self.handed_in else LEFT
+
 
 def occasions(session: SessionRecord) -> list[Occasion]:
     """Return each presentation of a questionnaire in a session, in order."""
@@ -119,33 +124,16 @@ def answers_of(participant: Participant) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    rows = [
-        {**_when(participant, number, asked), **row}
-        for number, session in participant.sessions()
-        for asked in occasions(session)
-        for row in _answers(session, asked)
-    ]
-    return pd.DataFrame(rows, columns=list(ANSWERS))
+    rows = participant.rows(_answers)
+    return pd.DataFrame(rows, columns=list(ANSWERS)).assign(status=str(participant.status))
 
 
 def scores_of(participant: Participant) -> "pd.DataFrame":
     """Return one row per score of all sessions."""
     import pandas as pd
 
-    rows = [
-        {
-            **_when(participant, number, asked),
-            "version": version_of(session, asked.questionnaire),
-            "score": name,
-            "value": _number(value),
-            "missing": "" if value is not None else OMITTED if asked.handed_in else LEFT,
-            "time": asked.ended,
-        }
-        for number, session in participant.sessions()
-        for asked in occasions(session)
-        for name, value in asked.scores.items()
-    ]
-    return pd.DataFrame(rows, columns=list(SCORES))
+    rows = participant.rows(_scores)
+    return pd.DataFrame(rows, columns=list(SCORES)).assign(status=str(participant.status))
 
 
 def beside_trials(measures: "pd.DataFrame", participant: Participant) -> "pd.DataFrame":
@@ -185,38 +173,40 @@ def score_column(questionnaire: str, score: str, asked: Collection[str]) -> str:
     return f"{questionnaire}.score.{score}" if name in asked else name
 
 
-def _when(participant: Participant, number: int, asked: Occasion) -> dict[str, Any]:
-    return {
-        "participant": participant.name,
-        "status": str(participant.status),
-        "session": number,
-        "step": asked.step,
-        "block": asked.block,
-        "trial": asked.trial,
-        "questionnaire": asked.questionnaire,
-    }
+def _answers(session: SessionRecord) -> Iterator[dict[str, Any]]:
+    for asked in occasions(session):
+        about = asked_in(session).get(asked.questionnaire, {})
+        items = [item["name"] for item in about.get("items", ())]
+        # Answers that are not among the items can only be from an older recording.
+        for name in dict.fromkeys([*items, *asked.answers]):
+            value, time = asked.answers.get(name, (None, asked.ended))
+            missing = DECLINED if name in asked.answers else asked.silent
+            yield {
+                **_when(session, asked),
+                "language": str(about.get("language", "")),
+                "item": name,
+                "value": _number(value),
+                "text": value if isinstance(value, str) else "",
+                "missing": missing if value is None else "",
+                "time": time,
+            }
 
 
-def _answers(session: SessionRecord, asked: Occasion) -> Iterator[dict[str, Any]]:
-    about = asked_in(session).get(asked.questionnaire, {})
-    items = [item["name"] for item in about.get("items", ())]
-    # Answers that are not among the items can only be from an older recording.
-    for name in dict.fromkeys([*items, *asked.answers]):
-        value, time = asked.answers.get(name, (None, asked.ended))
-        missing = ""
-        if name not in asked.answers:
-            missing = OMITTED if asked.handed_in else LEFT
-        elif value is None:
-            missing = DECLINED
-        yield {
-            "version": version_of(session, asked.questionnaire),
-            "language": str(about.get("language", "")),
-            "item": name,
-            "value": _number(value),
-            "text": value if isinstance(value, str) else "",
-            "missing": missing,
-            "time": time,
-        }
+def _scores(session: SessionRecord) -> Iterator[dict[str, Any]]:
+    for asked in occasions(session):
+        for name, value in asked.scores.items():
+            yield {
+                **_when(session, asked),
+                "score": name,
+                "value": _number(value),
+                "missing": asked.silent if value is None else "",
+                "time": asked.ended,
+            }
+
+
+def _when(session: SessionRecord, asked: Occasion) -> dict[str, Any]:
+    when = {name: getattr(asked, name) for name in ("step", "block", "trial", "questionnaire")}
+    return when | {"version": version_of(session, asked.questionnaire)}
 
 
 def _number(value: object) -> float:

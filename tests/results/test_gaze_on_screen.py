@@ -140,10 +140,10 @@ def test_an_offset_of_0_8_degrees_is_recovered_within_0_05(
     gaze[10:14] = [np.array([math.nan, math.nan])] * 4  # a blink
     gaze[20:24] = [np.array([5.0, 5.0])] * 4  # a look away
     found = drift(np.array(gaze), target, centre, px_per_m, viewing_m)
-    assert found.deg == pytest.approx(0.8, abs=0.05)
-    assert 0.1 < found.spread_deg < 0.5
+    assert found["deg"] == pytest.approx(0.8, abs=0.05)
+    assert 0.1 < found["spread_deg"] < 0.5
     none = drift(np.array([target] * 5), target, centre, px_per_m, viewing_m)
-    assert none.deg == 0.0
+    assert none["deg"] == 0.0
 
 
 def test_a_drift_of_nothing_but_blinks_is_refused() -> None:

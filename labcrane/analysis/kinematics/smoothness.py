@@ -4,6 +4,9 @@ import numpy as np
 
 from labcrane.types import FloatArray
 
+PADDING = 4
+"""The spectrum has 2 to this power times more points than the next power of 2."""
+
 
 def sparc(
     speed: FloatArray,
@@ -11,7 +14,6 @@ def sparc(
     *,
     highest_hz: float = 10.0,
     least: float = 0.05,
-    padding: int = 4,
 ) -> float:
     """Return the spectral arc length of a speed profile: 0 is smoothest, less is less smooth.
 
@@ -24,10 +26,8 @@ def sparc(
     ----------
     speed
         From onset to offset, in any unit, shape ``(n,)``.
-    padding
-        The spectrum has 2 to the power of ``padding`` times more points than the next power of 2.
     """
-    points = 2 ** (int(np.ceil(np.log2(len(speed)))) + padding)
+    points = 2 ** (int(np.ceil(np.log2(len(speed)))) + PADDING)
     frequency = np.arange(points) * (rate_hz / points)
     spectrum = np.abs(np.fft.fft(speed, points))
     spectrum /= spectrum.max()

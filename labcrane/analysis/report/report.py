@@ -1,7 +1,6 @@
 """The report of a study: one page, one page per participant, figures and tables."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -101,9 +100,9 @@ def write_report(
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "participants").mkdir(exist_ok=True)
     one = partial(_one, settings=settings, folder=folder.resolve())
-    found: dict[str, PersonTables] = {}
+    found: dict[str, Tables] = {}
     for name, made in work(one, cohort.included, workers, scheduler):
-        if isinstance(made, PersonTables):
+        if not isinstance(made, Unusable):
             found[name] = made
         else:
             cohort = cohort.without(name, made.status, made.why)
@@ -115,34 +114,34 @@ def write_report(
         if progress is not None:
             progress(len(found), len(cohort.included))
     of_each = {person.name: found[person.name] for person in cohort.included}
-    groups = {name: own.group for name, own in of_each.items()}
+    groups = {name: _group(own["movements"]) for name, own in of_each.items()}
     tables = _joined(list(of_each.values()))
-    everything = with_unseen_areas(tables.movements)
+    everything = with_unseen_areas(tables["movements"])
     kinds = kinds_of(cohort.included)
     page = Page(_title(cohort.included), folder / "report.html", folder, footer=kinds)
     _stamp(page, cohort.included)
     page.links({p.name: f"participants/{p.name}.html" for p in cohort.included})
     _who(page, cohort, everything)
-    about = _sample(page, cohort, tables.answers, groups)
+    about = _sample(page, cohort, tables["answers"], groups)
     results, defined = None, _definitions(cohort, everything)
     if _is_aiming(everything[is_result(everything)]):
         units = dict(zip(defined["measure"], defined["unit"], strict=True))
         primary, planned = _primary(cohort), _planned_groups(cohort)
-        results = _study(page, everything, tables.scores, groups, about, primary, units, planned)
-    add_thresholds(page, tables.thresholds, judge)
-    _drifts(page, tables.drifts)
+        results = _study(page, everything, tables["scores"], groups, about, primary, units, planned)
+    add_thresholds(page, tables["thresholds"], judge)
+    _drifts(page, tables["drifts"])
     page.rows(
         "unmeasured_gaze",
-        tables.unmeasured,
+        tables["unmeasured"],
         "These streams were recorded completely, but no measure uses them:",
         "Gaze that is not measured",
     )
     page.heading("Loop and clocks")
-    page.table("loop_quality", tables.loop)
+    page.table("loop_quality", tables["loop"])
     _syncs(page, tables)
     if unprobed:
         page.say(f"Used on request, though timestamp accuracy is unknown: {'; '.join(unprobed)}.")
-    page.lead(answer(cohort, everything, (tables.loop, tables.sync), about, results))
+    page.lead(answer(cohort, everything, (tables["loop"], tables["sync"]), about, results))
     page.heading("Definitions")
     words = "; ".join(f"{name} {_setting(value)}" for name, value in settings.as_dict().items())
     page.say(f"Settings of the measures: {words}.")
@@ -155,74 +154,52 @@ def write_report(
     return page.write()
 
 
-@dataclass(frozen=True, slots=True)
-class PersonTables:
-    """Tables of one participant, or of a cohort.
+TABLES: Mapping[str, Callable[[Participant], "pd.DataFrame"]] = {
+    "loop": loop_quality,
+    "sync": sync_quality,
+    "loop_backs": loop_backs,
+    "answers": answers_of,
+    "scores": scores_of,
+    "thresholds": thresholds_of,
+    "drifts": fixations_of,
+    "unmeasured": unmeasured_of,
+}
+"""What is read of each participant in addition to the movements, and joined over the cohort."""
 
-    Attributes
-    ----------
-    movements
-        All trials with their measures, also those excluded from means.
-    loop, sync, loop_backs
-        Quality of the loop by session, of external clocks by stream, and of both by sensors.
-    answers, scores, thresholds
-        Of questionnaires, and of tracks.
-    drifts, unmeasured
-        Of gaze: its drift in checks of the eye tracker, and streams that no measure uses.
-    """
-
-    movements: "pd.DataFrame"
-    loop: "pd.DataFrame"
-    sync: "pd.DataFrame"
-    loop_backs: "pd.DataFrame"
-    answers: "pd.DataFrame"
-    scores: "pd.DataFrame"
-    thresholds: "pd.DataFrame"
-    drifts: "pd.DataFrame"
-    unmeasured: "pd.DataFrame"
-
-    @property
-    def group(self) -> str:
-        """The participant's group; empty if there is none, or no movement."""
-        return str(self.movements[GROUP].iloc[0]) if len(self.movements) else ""
+Tables = dict[str, "pd.DataFrame"]
 
 
-def _joined(of_each: Sequence[PersonTables]) -> PersonTables:
+def _joined(of_each: Sequence[Tables]) -> Tables:
     """Return tables of participants as those of the cohort."""
     import pandas as pd
 
     joined = {}
-    for field in fields(PersonTables):
-        tables = [getattr(one, field.name) for one in of_each]
+    for name in of_each[0]:
+        tables = [one[name] for one in of_each]
         filled = [table for table in tables if len(table)]  # others have no types to go by
-        joined[field.name] = pd.concat(filled, ignore_index=True) if filled else tables[0]
-    return PersonTables(**joined)
+        joined[name] = pd.concat(filled, ignore_index=True) if filled else tables[0]
+    return joined
 
 
 def _one(
     participant: Participant, settings: MeasureSettings, folder: Path
-) -> tuple[str, PersonTables | Unusable]:
+) -> tuple[str, Tables | Unusable]:
     """Write one participant's page; return the tables, or the reason why there are none."""
     try:
         with kept_open(participant.path):
             own = measures_of(participant, settings)
             if GROUP not in own:  # trials say it where the study has groups
                 own.insert(0, GROUP, str(participant.context.get("group", "")))
-            tables = PersonTables(
-                movements=own,
-                loop=loop_quality(participant),
-                sync=sync_quality(participant),
-                loop_backs=loop_backs(participant),
-                answers=answers_of(participant),
-                scores=scores_of(participant),
-                thresholds=thresholds_of(participant),
-                drifts=fixations_of(participant),
-                unmeasured=unmeasured_of(participant),
-            )
+            tables = {"movements": own} | {name: of(participant) for name, of in TABLES.items()}
             _participant_page(participant, tables, folder)
     except Exception as error:  # noqa: BLE001 - one recording never stops a cohort
         return participant.name, Unusable.of(error)
     return participant.name, tables
+
+
+def _group(movements: "pd.DataFrame") -> str:
+    """Return the participant's group; empty if there is none, or no movement."""
+    return str(movements[GROUP].iloc[0]) if len(movements) else ""
 
 
 def _primary(cohort: Cohort) -> list[str]:
@@ -602,14 +579,14 @@ def _of_model(model: MixedModel) -> Iterator[str]:
         yield f"{name} is not in the model: it cannot be distinguished from the other terms."
 
 
-def _syncs(page: Page, tables: PersonTables) -> None:
-    if tables.sync.empty:
+def _syncs(page: Page, tables: Tables) -> None:
+    if tables["sync"].empty:
         page.say("No external streams were recorded: there is one clock.")
     else:
-        page.table("sync_quality", tables.sync)
+        page.table("sync_quality", tables["sync"])
     page.rows(
         "loop_back",
-        tables.loop_backs,
+        tables["loop_backs"],
         "What photodiodes and microphones recorded of pictures and sounds: the delay is that of "
         "screen, sensor and device together, and a stream whose delay grows by more than is stated "
         "fails.",
@@ -631,8 +608,8 @@ def _definitions(cohort: Cohort, everything: "pd.DataFrame") -> "pd.DataFrame":
     return table[["measure", "unit", "meaning"]]
 
 
-def _participant_page(participant: Participant, tables: PersonTables, folder: Path) -> None:
-    own = tables.movements
+def _participant_page(participant: Participant, tables: Tables, folder: Path) -> None:
+    own = tables["movements"]
     path = folder / "participants" / f"{participant.name}.html"
     page = Page(
         participant.name,
@@ -656,6 +633,6 @@ def _participant_page(participant: Participant, tables: PersonTables, folder: Pa
         "Marks",
     )
     page.heading("Loop and clocks")
-    page.table("loop_quality", tables.loop)
+    page.table("loop_quality", tables["loop"])
     _syncs(page, tables)
     page.write()

@@ -1,11 +1,12 @@
 """Thresholds from tracks: those of participants, and the error of such estimates."""
 
 import json
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.report.html import Page
+from labcrane.recording.participant_file.reader import SessionRecord
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,19 +30,21 @@ def thresholds_of(participant: Participant) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    rows = {}
-    for number, session in participant.sessions():
-        laws = session.context.get("tracks", {})
-        events = session.events
-        for told in events.loc[events["name"] == ENDED, "data"]:
-            name = str(told["track"])
-            law = json.dumps(laws[name], sort_keys=True) if name in laws else ""
-            where = [told.get(each) for each in ("estimate", "sd", "responses", "ended")]
-            rows[number, told["block"]] = (
-                participant.name, number, told["block_name"], name, *where, law,
-            )  # fmt: skip
-    table = pd.DataFrame(list(rows.values()), columns=list(COLUMNS))
+    table = pd.DataFrame(participant.rows(_ends), columns=list(COLUMNS))
     return table.astype({"estimate": float, "sd": float})
+
+
+def _ends(session: SessionRecord) -> Iterable[dict[str, Any]]:
+    laws, events, rows = session.context.get("tracks", {}), session.events, {}
+    for told in events.loc[events["name"] == ENDED, "data"]:
+        name = str(told["track"])
+        rows[told["block"]] = {
+            "block": told["block_name"],
+            "track": name,
+            **{each: told.get(each) for each in ("estimate", "sd", "responses", "ended")},
+            LAW: json.dumps(laws[name], sort_keys=True) if name in laws else "",
+        }
+    return rows.values()
 
 
 def add_thresholds(page: Page, found: "pd.DataFrame", judge: Judge | None) -> None:

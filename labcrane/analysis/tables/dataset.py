@@ -32,8 +32,6 @@ def open_dataset(folder: Path | str, include: Iterable[str] = ()) -> "Dataset":
 
     Parameters
     ----------
-    folder
-        The study's data folder.
     include
         As in :func:`~labcrane.analysis.cohort.find_cohort`.
 

@@ -16,10 +16,7 @@ def films_of(participant: Participant) -> "pd.DataFrame":
     import pandas as pd
 
     return pd.DataFrame(
-        [
-            {"participant": participant.name, "session": number, **row}
-            for number, session in participant.sessions()
-            for film in session.films.values()
-            for row in film.listed()
-        ]
+        participant.rows(
+            lambda session: (row for film in session.films.values() for row in film.listed())
+        )
     )

@@ -29,16 +29,9 @@ LIBRARIES = ("numpy", "pandas", "pyarrow", "scipy")
 def kept(
     path: Path, about: Mapping[str, object], make: "Callable[[], pd.DataFrame]"
 ) -> "pd.DataFrame":
-    """Return what ``make`` returns of a participant file; made only when it is not kept yet.
+    """Return what ``make`` returns of the participant file; made only when it is not kept yet.
 
-    Parameters
-    ----------
-    path
-        The participant file.
-    about
-        What else it depends on, ready for JSON.
-    make
-        Works it out.
+    ``about`` is what else it depends on, ready for JSON.
     """
     import pandas as pd
 
