@@ -19,7 +19,6 @@ from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.report.findings import Results, of_gaze_measures
 from labcrane.analysis.report.html import Page
 from labcrane.analysis.report.outcomes import StudyMovements, gaze_table, little_gaze, measures_in
-from labcrane.analysis.report.panels import Panel, Series, figure_of
 from labcrane.analysis.report.report import write_report
 from labcrane.analysis.report.sample import in_words, sample
 from labcrane.analysis.report.words import STYLES, paragraphs
@@ -55,16 +54,6 @@ def test_each_figure_is_svg_png_and_pdf_stamped_where_it_is_of_no_people(folder:
         assert len(pd.read_csv(folder / f"{figure.replace('figures', 'tables')}.csv"))
     for name in ("results.md", "results.tex"):
         assert (folder / name).read_text(encoding="utf-8").startswith("SIMULATED.\n\n")
-
-
-def test_a_panel_is_drawn_with_its_numbers_and_words() -> None:
-    x, y = np.arange(5.0), np.random.default_rng().normal(size=5)
-    panel = Panel("across", "up", [Series(x, y, "#123456", "line", "one")], "title")
-    (axes,) = figure_of([panel]).axes
-    (line,) = axes.get_lines()
-    np.testing.assert_array_equal(line.get_xydata(), np.column_stack([x, y]))
-    assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_title()) == ("across", "up", "title")
-    assert (line.get_color(), line.get_marker()) == ("#123456", "")
 
 
 @pytest.mark.slow
@@ -211,11 +200,13 @@ def test_a_mean_of_two_people_has_no_bar_in_figures_and_its_interval_in_the_tabl
         for person in range(5) for place in (1, 2, 3)
     ]  # fmt: skip
     drawing = figures.by_distance(pd.DataFrame(rows))
-    (panel,) = drawing.panels
-    two, three = (one.reach for one in panel.series if one.kind != "dots")
+    (axes,) = drawing.figure.axes
+    two, three = (
+        np.ptp([bar[:, 1] for bar in bars.get_segments()], axis=1) for bars in axes.collections
+    )
     assert (two == 0.0).all()
     own = drawing.table[drawing.table["distance"] == 4.0]
-    assert three[0] == pytest.approx((own["mean"] - own["ci_low"]).to_numpy())
+    assert three == pytest.approx((own["ci_high"] - own["ci_low"]).to_numpy())
     assert (three > 0.0).all()
     few = drawing.table[drawing.table["distance"] == 2.0]
     assert (few["ci_high"] > few["mean"]).all()

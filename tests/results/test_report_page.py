@@ -20,9 +20,8 @@ from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.report.findings import Results, of_outcomes
 from labcrane.analysis.report.html import Page
 from labcrane.analysis.report.outcomes import StudyMovements
-from labcrane.analysis.report.panels import Panel, Series
 from labcrane.analysis.report.report import write_report
-from labcrane.analysis.report.style import COLUMN, MM, PAGE
+from labcrane.analysis.report.style import COLUMN, MM, PAGE, new_figure
 from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
 from labcrane.analysis.tables.definitions import MEASURES
@@ -246,8 +245,7 @@ def test_the_answer_stands_first_then_the_contents_and_tables_are_folded(
     for name in ("one", "two", "three", "four"):
         page.heading(name)
         page.table(name, pd.DataFrame({"a": [1.0]}))
-    panel = Panel("across", "up", [Series(np.arange(2.0), np.arange(2.0))])
-    page.draw(figures.Drawing("drawn", "A line", [panel], pd.DataFrame({"a": [1.0]})))
+    page.draw(figures.Drawing("drawn", "A line", new_figure(), pd.DataFrame({"a": [1.0]})))
     page.lead({"Design": ["within"], "Nothing": []})
     text = page.write().read_text(encoding="utf-8")
     order = [

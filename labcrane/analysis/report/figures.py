@@ -1,15 +1,15 @@
 """The report's figures, each with the table it shows."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from labcrane.analysis.report.factors import CONDITION
-from labcrane.analysis.report.panels import FAINT, GREY, Panel, Series, figure_of, lighter
 from labcrane.analysis.report.sample import counted
-from labcrane.analysis.report.style import COLOURS, HIGH, PAGE, new_figure, styled
+from labcrane.analysis.report.style import COLOURS, HIGH, MARKERS, PAGE, new_figure, styled
 from labcrane.analysis.statistics.fitts import Regression, mean_line, regress
 from labcrane.analysis.statistics.learning import CURVES
 from labcrane.analysis.statistics.trends import LEAST
@@ -18,6 +18,7 @@ from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 WORDS = {
@@ -30,7 +31,6 @@ WORDS = {
     "reversals": "stick reversals (1/s)",
     "sparc": "smoothness (SPARC)",
 }
-
 
 FRACTION = (-0.03, 1.03)
 """Range of an axis of fractions, which are 0 to 1."""
@@ -47,41 +47,24 @@ LINE = 0.13
 """Inches from one name to the next."""
 
 
+GREY, FAINT = "#999999", "#c7c7c7"
+"""Of dots, and of thin lines behind everything else."""
+
+WORDS_A_LINE = 30
+"""Letters of an axis' name beside a figure of one column: longer ones go into two lines."""
+
+ROW, HEAD = 0.8, 0.7
+"""Height of a row of the figure of load, and of all else in it, in inches."""
+
+
 @dataclass(frozen=True, slots=True)
 class Drawing:
     """A figure, its file name, its caption, and its table."""
 
     name: str
     caption: str
-    panels: Sequence[Panel]
+    figure: "Figure"
     table: "pd.DataFrame"
-
-    @property
-    def figure(self) -> "Figure":
-        """The figure as Matplotlib draws it."""
-        return figure_of(self.panels)
-
-
-ROW, HEAD = 0.8, 0.7
-"""Height of a row of the figure of load, and of all else in it, in inches."""
-
-
-class Lines(Drawing):
-    """A dot on a line of its own for each participant, and a line at their mean."""
-
-    @property
-    def figure(self) -> "Figure":
-        own = self.table.sort_values("throughput")
-        named = len(own) <= MOST_NAMED
-        with styled():
-            figure = new_figure(high=max(HIGH, LINE * len(own) + 0.6) if named else HIGH)
-            (axes,) = figure.axes
-            places = np.arange(len(own))
-            axes.plot(own["throughput"], places, "o", color=COLOURS[0])
-            axes.set_yticks(places if named else [], own["participant"] if named else [])
-            axes.axvline(float(own["throughput"].mean()), color="k", lw=0.8)
-            axes.set(xlabel="throughput (bit/s)", ylabel="participant")
-        return figure
 
 
 def over(movements: "pd.DataFrame", measure: str, by: list[str]) -> "pd.DataFrame":
@@ -100,6 +83,7 @@ def over(movements: "pd.DataFrame", measure: str, by: list[str]) -> "pd.DataFram
     return pd.DataFrame(rows, columns=columns)
 
 
+@styled()
 def by_sequence(
     movements: "pd.DataFrame", measure: str, tested: "pd.DataFrame | None" = None
 ) -> Drawing:
@@ -113,27 +97,30 @@ def by_sequence(
     """
     few = tested is not None and 0 < len(tested) < len(movements)
     whose = tested if few and tested is not None else movements
-    series = _thin(movements, measure)
+    figure = new_figure()
+    (axes,) = figure.axes
+    _thin(axes, movements, measure)
     groups = movements["group"].nunique() > 1
     by = ["group", "sequence"] if groups else ["sequence"]
     table = over(whose, measure, by)
     for number, (name, part) in enumerate(table.groupby("group") if groups else [("", table)]):
         for at, own in enumerate(_by_phase(movements, part)):
-            label = str(name) if at == 0 else ""
-            series.append(_with_ci(own, COLOURS[number % len(COLOURS)], label))
-    panel = Panel(PLACE_WORDS, WORDS.get(measure, measure), series, legend="group")
+            _with_ci(axes, own, number, str(name) if at == 0 else "")
+    _name(axes, measure)
+    _legend(figure, "group")
     caption = (
         f"{_begun(WORDS.get(measure, measure))}, over the sequence. {MEANS} of "
         f"{_of(whose, 'group' if groups else '')}{', those who are tested' if few else ''}"
         f"{_at(table)}; thin lines: each of {_all(movements)}."
     )
-    return Drawing(f"{measure}_by_sequence", caption, [panel], table)
+    return Drawing(f"{measure}_by_sequence", caption, figure, table)
 
 
-def _thin(movements: "pd.DataFrame", measure: str) -> list[Series]:
-    """Return a line for each participant."""
+def _thin(axes: "Axes", movements: "pd.DataFrame", measure: str) -> None:
+    """Draw a line for each participant."""
     each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
-    return [Series(_numbers(each.index), _numbers(each[who]), FAINT, "line") for who in each]
+    for who in each:
+        axes.plot(_numbers(each.index), _numbers(each[who]), color=FAINT, lw=0.5)
 
 
 def _by_phase(movements: "pd.DataFrame", table: "pd.DataFrame") -> "list[pd.DataFrame]":
@@ -142,6 +129,7 @@ def _by_phase(movements: "pd.DataFrame", table: "pd.DataFrame") -> "list[pd.Data
     return [part for _, part in table.groupby(table["sequence"].map(phases))]
 
 
+@styled()
 def by_distance(movements: "pd.DataFrame") -> Drawing:
     """Draw times and accuracy over the sequence for each distance."""
     import pandas as pd
@@ -151,39 +139,41 @@ def by_distance(movements: "pd.DataFrame") -> Drawing:
         for name in ("circle_to_circle", "movement_time", "absolute_error")
         if name in movements and movements[name].notna().any()
     ]
-    panels, tables = [], []
-    for at, measure in enumerate(shown):
+    figure, tables = new_figure(len(shown)), []
+    for at, (axes, measure) in enumerate(zip(figure.axes, shown, strict=True)):
         table = over(movements, measure, ["distance", "sequence"])
         own = movements.groupby(["distance", "participant", "sequence"])[measure].mean()
-        count = table["distance"].nunique()
-        dots, means = [], []
-        for number, (distance, part) in enumerate(table.groupby("distance")):
-            colour, aside = COLOURS[number % len(COLOURS)], _aside(number, count)
-            each = own.loc[distance].reset_index()
-            where = _numbers(each["sequence"]) + aside
-            dots.append(Series(where, _numbers(each[measure]), lighter(colour), "dots"))
-            beside = part.assign(sequence=part["sequence"] + aside)
-            means.append(_with_ci(beside, colour, "" if at else f"{distance:g} m"))
-        panels.append(
-            Panel(PLACE_WORDS, WORDS[measure], [*dots, *means], legend="distance", keep=_range(own))
-        )
+        levels = list(table.groupby("distance"))
+        for number, (distance, _) in enumerate(levels):
+            each, colour = own.loc[distance].reset_index(), COLOURS[number % len(COLOURS)]
+            where = _numbers(each["sequence"]) + _aside(number, len(levels))
+            axes.plot(where, _numbers(each[measure]), ".", color=lighter(colour), lw=0.8)
+        for number, (distance, part) in enumerate(levels):
+            beside = part.assign(sequence=part["sequence"] + _aside(number, len(levels)))
+            _with_ci(axes, beside, number, "" if at else f"{distance:g} m")
+        _name(axes, measure)
+        axes.set_ylim(*_range(own))
         tables.append(table.assign(measure=measure))
+    _legend(figure, "distance")
     caption = (
         f"Times and accuracy over the sequence, for each distance. {MEANS} of {_of(movements)}"
         f"{_at(pd.concat(tables))}, "
         "side by side to be distinguishable; dots: each participant. An interval of few "
         "participants may be wider than the figure shows."
     )
-    return Drawing("sequence_by_distance", caption, panels, pd.concat(tables))
+    return Drawing("sequence_by_distance", caption, figure, pd.concat(tables))
 
 
+@styled()
 def fitts(movements: "pd.DataFrame") -> Drawing:
     """Draw movement time over difficulty, with the mean of the participants' regressions."""
     import pandas as pd
 
     cells = movements.groupby(["participant", "difficulty"])["movement_time"].mean().reset_index()
     x, y = _numbers(cells["difficulty"]), _numbers(cells["movement_time"])
-    series, law = [Series(x, y, GREY, "dots")], ""
+    figure, law = new_figure(), ""
+    (axes,) = figure.axes
+    axes.plot(x, y, ".", color=GREY, lw=0.8)
     lines = {
         str(participant): regress(_numbers(own["difficulty"]), _numbers(own["movement_time"]))
         for participant, own in movements.groupby("participant")
@@ -192,18 +182,18 @@ def fitts(movements: "pd.DataFrame") -> Drawing:
     rows = [_line(*each) for each in [*lines.items(), ("mean of participants' lines", whole)]]
     if whole is not None:
         ends = np.array([x.min(), x.max()])
-        series.append(Series(ends, whole.intercept + whole.slope * ends, COLOURS[0], "line"))
+        axes.plot(ends, whole.intercept + whole.slope * ends, color=COLOURS[0], lw=0.8)
         low, high = whole.slope_ci
         law = (
             f" Line: the mean of {whole.n} participants' lines, {whole.intercept:.2f} s + "
             f"{whole.slope:.2f} s/bit (95 % interval over people {low:.2f} to {high:.2f})."
         )
-    panel = Panel("index of difficulty (bit)", WORDS["movement_time"], series)
+    _name(axes, "movement_time", "index of difficulty (bit)")
     caption = (
         f"Fitts' law: movement time over the index of difficulty. Dots: each participant's mean at "
         f"each difficulty, {_of(movements)}.{law}"
     )
-    return Drawing("fitts", caption, [panel], pd.DataFrame(rows))
+    return Drawing("fitts", caption, figure, pd.DataFrame(rows))
 
 
 def _numbers(column: "pd.Series[Any] | pd.Index[Any]") -> FloatArray:
@@ -226,13 +216,15 @@ def _line(who: str, fit: Regression | None) -> dict[str, object]:
     }
 
 
+@styled()
 def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) -> Drawing:
     """Draw participants' means and the better of both learning curves for each.
 
     Curves count from the first position of their session or block. With too few positions to
     compare the curves, only means are drawn.
     """
-    series = []
+    figure = new_figure()
+    (axes,) = figure.axes
     fitted_to = curves[curves["measure"] == measure]
     people = {name: number for number, name in enumerate(fitted_to["participant"].unique())}
     best = fitted_to.sort_values("better").drop_duplicates(["participant", "phase"], keep="last")
@@ -242,7 +234,7 @@ def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) ->
         own = own[own["phase"] == row.phase]
         means = own.groupby("sequence")[measure].mean()
         colour = COLOURS[people[row.participant] % len(COLOURS)]
-        series.append(Series(_numbers(means.index), _numbers(means), colour, "dots"))
+        axes.plot(_numbers(means.index), _numbers(means), ".", color=colour, lw=0.8)
         if row.better == "no":
             continue
         drawn += 1
@@ -250,44 +242,57 @@ def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) ->
         n = np.linspace(1, float(means.index.max()) - before, 100)
         curve: Callable[..., np.ndarray] = CURVES[str(row.curve)]
         fitted = curve(n, row.asymptote, row.gain, row.rate)
-        series.append(Series(n + before, fitted, colour, "line"))
-    panel = Panel(PLACE_WORDS, WORDS.get(measure, measure), series)
+        axes.plot(n + before, fitted, color=colour, lw=0.8)
+    _name(axes, measure)
     caption = (
         f"Learning curves of {_begun(WORDS.get(measure, measure)).lower()}. Dots: each "
         f"participant's means, n = {counted(len(people), 'participant')}; lines: the better of an "
         "exponential and a power curve"
         + ("." if drawn else ", which cannot be fitted to so few positions.")
     )
-    return Drawing(f"learning_{measure}", caption, [panel], curves)
+    return Drawing(f"learning_{measure}", caption, figure, curves)
 
 
+@styled()
 def sticks(movements: "pd.DataFrame") -> Drawing:
     """Draw how the sticks were used over the sequence."""
     import pandas as pd
 
-    panels, tables = [], []
-    for measure in ("simultaneous", "bimanual", "reversals"):
+    measures, tables = ("simultaneous", "bimanual", "reversals"), []
+    figure = new_figure(len(measures))
+    for axes, measure in zip(figure.axes, measures, strict=True):
         table = over(movements, measure, ["sequence"])
-        drawn = [*_thin(movements, measure), _with_ci(table, COLOURS[0])]
-        keep = None if measure == "reversals" else FRACTION
-        panels.append(Panel(PLACE_WORDS, WORDS[measure], drawn, keep=keep))
+        _thin(axes, movements, measure)
+        _with_ci(axes, table, 0)
+        _name(axes, measure)
+        if measure != "reversals":
+            axes.set_ylim(*FRACTION)
         tables.append(table.assign(measure=measure))
     caption = (
         f"Use of the sticks over the sequence. {MEANS} of {_of(movements)}"
         f"{_at(pd.concat(tables))}; thin lines: each participant."
     )
-    return Drawing("sticks", caption, panels, pd.concat(tables))
+    return Drawing("sticks", caption, figure, pd.concat(tables))
 
 
+@styled()
 def throughputs(table: "pd.DataFrame") -> Drawing:
     """Draw each participant's throughput, the least at the bottom, each on a line of its own."""
-    mean, count = float(table["throughput"].mean()), len(table)
+    mean, own = float(table["throughput"].mean()), table.sort_values("throughput")
+    named = len(own) <= MOST_NAMED
+    figure = new_figure(high=max(HIGH, LINE * len(own) + 0.6) if named else HIGH)
+    (axes,) = figure.axes
+    places = np.arange(len(own))
+    axes.plot(own["throughput"], places, "o", color=COLOURS[0])
+    axes.set_yticks(places if named else [], own["participant"] if named else [])
+    axes.axvline(float(own["throughput"].mean()), color="k", lw=0.8)
+    axes.set(xlabel="throughput (bit/s)", ylabel="participant")
     caption = (
         f"Throughput: mean over distances and widths of targets. Dots: each participant, "
-        f"n = {counted(count, 'participant')}; "
+        f"n = {counted(len(table), 'participant')}; "
         f"line: their mean, {mean:.3f} bit/s."
     )
-    return Lines("throughput", caption, (), table)
+    return Drawing("throughput", caption, figure, table)
 
 
 def _range(values: "pd.Series[float]") -> tuple[float, float]:
@@ -325,13 +330,41 @@ def _aside(number: int, count: int) -> float:
     return 0.12 * (number - (count - 1) / 2.0)
 
 
-def _with_ci(table: "pd.DataFrame", colour: str, label: str = "") -> Series:
+def _with_ci(axes: "Axes", table: "pd.DataFrame", number: int, label: str = "") -> None:
+    """Draw means of a level over the sequence, with their intervals."""
     below, above = table["mean"] - table["ci_low"], table["ci_high"] - table["mean"]
     few = np.asarray(table["participants"], float) < LEAST  # the bar of two is of their difference
-    reach = np.where(few, 0.0, np.nan_to_num(np.array([below, above], float)))
-    return Series(
-        _numbers(table["sequence"]), _numbers(table["mean"]), colour, label=label, reach=reach
+    axes.errorbar(
+        _numbers(table["sequence"]),
+        _numbers(table["mean"]),
+        np.where(few, 0.0, np.nan_to_num(np.array([below, above], float))),
+        capsize=1.5,
+        label=label or None,
+        color=COLOURS[number % len(COLOURS)],
+        marker=MARKERS[number % len(MARKERS)],
+        linestyle="-",
     )
+
+
+def _name(axes: "Axes", measure: str, across: str = PLACE_WORDS) -> None:
+    up = WORDS.get(measure, measure)
+    axes.set(xlabel=across, ylabel=fill(up, WORDS_A_LINE))
+
+
+def _legend(figure: "Figure", title: str) -> None:
+    """Add a legend of all axes above them, where anything has a label."""
+    named = [
+        each for axes in figure.axes for each in zip(*axes.get_legend_handles_labels(), strict=True)
+    ]
+    if named:
+        handles, labels = zip(*named, strict=True)
+        figure.legend(handles, labels, title=title, loc="outside upper center", ncols=4)
+
+
+def lighter(colour: str) -> str:
+    """Return a colour as it looks at a third of its strength on white."""
+    parts = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
+    return "#" + "".join(f"{255 - (255 - part) // 3:02x}" for part in parts)
 
 
 @styled()
@@ -356,46 +389,36 @@ def power_curve(table: "pd.DataFrame", whose: str) -> "Figure":
     return figure
 
 
-class LoadFigure(Drawing):
-    """A row for each person, a column for each measure, conditions from left to right."""
-
-    @property
-    def figure(self) -> "Figure":
-        """The figure as Matplotlib draws it."""
-        from matplotlib.figure import Figure
-
-        people = list(dict.fromkeys(self.table["participant"].sort_values()))
-        measures = list(dict.fromkeys(self.table["measure"]))
-        levels = sorted(set(self.table[CONDITION]))
-        with styled():
-            high = ROW * len(people) + HEAD
-            figure = Figure((PAGE, high), layout="constrained")
-            grid = figure.subplots(
-                len(people), len(measures), sharex=True, sharey="col", squeeze=False
-            )
-            for person, row in zip(people, grid, strict=True):
-                for measure, axes in zip(measures, row, strict=True):
-                    mine = self.table["participant"] == person
-                    own = self.table[mine & (self.table["measure"] == measure)]
-                    x = np.array([levels.index(each) for each in own[CONDITION]])
-                    ends = own["mean"] - own["ci_low"], own["ci_high"] - own["mean"]
-                    reach = np.nan_to_num(np.maximum(ends, 0.0))
-                    axes.errorbar(x, own["mean"], reach, fmt="o", color=COLOURS[0], elinewidth=0.8)
-                    axes.set_xlim(-0.5, len(levels) - 0.5)
-                    axes.spines[["top", "right"]].set_visible(False)
-                row[0].set_ylabel(person, rotation=0, ha="right", fontsize=6.0)
-            for measure, axes in zip(measures, grid[0], strict=True):
-                axes.set_title(measure.replace("_", "\n", 1), fontsize=6.5)
-            for axes in grid[-1]:
-                axes.set_xticks(range(len(levels)), levels, rotation=45, ha="right", fontsize=6.0)
-        return figure
-
-
+@styled()
 def load(table: "pd.DataFrame") -> Drawing:
-    """Return the figure of :func:`~labcrane.analysis.tables.load.load_table`."""
+    """Draw :func:`~labcrane.analysis.tables.load.load_table`.
+
+    A row for each person, a column for each measure, conditions from left to right.
+    """
+    from matplotlib.figure import Figure
+
+    people = list(dict.fromkeys(table["participant"].sort_values()))
+    measures = list(dict.fromkeys(table["measure"]))
+    levels = sorted(set(table[CONDITION]))
+    figure = Figure((PAGE, ROW * len(people) + HEAD), layout="constrained")
+    grid = figure.subplots(len(people), len(measures), sharex=True, sharey="col", squeeze=False)
+    for person, row in zip(people, grid, strict=True):
+        for measure, axes in zip(measures, row, strict=True):
+            own = table[(table["participant"] == person) & (table["measure"] == measure)]
+            x = np.array([levels.index(each) for each in own[CONDITION]])
+            ends = own["mean"] - own["ci_low"], own["ci_high"] - own["mean"]
+            reach = np.nan_to_num(np.maximum(ends, 0.0))
+            axes.errorbar(x, own["mean"], reach, fmt="o", color=COLOURS[0], elinewidth=0.8)
+            axes.set_xlim(-0.5, len(levels) - 0.5)
+            axes.spines[["top", "right"]].set_visible(False)
+        row[0].set_ylabel(person, rotation=0, ha="right", fontsize=6.0)
+    for measure, axes in zip(measures, grid[0], strict=True):
+        axes.set_title(measure.replace("_", "\n", 1), fontsize=6.5)
+    for axes in grid[-1]:
+        axes.set_xticks(range(len(levels)), levels, rotation=45, ha="right", fontsize=6.0)
     caption = (
         "Measures of load by condition, one row per person. Points: means of a person's movements, "
         f"bars: 95 % confidence intervals (t) over {FEWEST} or more movements; hit rates are of "
         "all stimuli, with Wilson's interval. A questionnaire that was asked once has none."
     )
-    return LoadFigure("load", caption, (), table)
+    return Drawing("load", caption, figure, table)

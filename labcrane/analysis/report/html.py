@@ -102,7 +102,7 @@ class Page:
             picture=f"{self._up}figures/{drawing.name}",
             csv=self._csv(drawing.name, drawing.table),
             size=_size(figure),
-            whole=len(drawing.panels) > 1,
+            whole=len(figure.axes) > 1,
         )
 
     def _add(self, kind: str, **it: object) -> None:
