@@ -56,6 +56,8 @@ class Participant:
         Simulated or pilot, whether half-finished or not; None for a person's data.
     study
         Name of the study that the file is of; empty where it is not known.
+    measured
+        The result of :func:`labcrane.analysis.measures.measures_of`, where it is there already.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Participant:
     why: str
     kind: Status | None = field(default=None, kw_only=True)
     study: str = field(default="", kw_only=True)
+    measured: "pd.DataFrame | None" = field(default=None, kw_only=True, repr=False, compare=False)
 
     @property
     def needs(self) -> frozenset[Status]:

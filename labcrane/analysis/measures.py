@@ -1,7 +1,7 @@
 """All measures of a participant, one row per movement."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -114,26 +114,13 @@ class MeasureSettings:
 DEFAULTS = MeasureSettings()
 
 
-@dataclass(frozen=True)
-class MeasuredParticipant(Participant):
-    """A participant with precomputed measures.
-
-    Attributes
-    ----------
-    table
-        The result of :func:`measures_of`.
-    """
-
-    table: "pd.DataFrame"
-
-
 def measures_of(participant: Participant, settings: MeasureSettings = DEFAULTS) -> "pd.DataFrame":
     """Return one row per counted movement of all sessions: condition, results, measures.
 
     Computed once, and cached next to the participant file (:mod:`~.analysis.tables.measure_cache`).
     """
-    if isinstance(participant, MeasuredParticipant):
-        return participant.table
+    if participant.measured is not None:
+        return participant.measured
     about = {"measures": settings.as_dict()}
     table = kept(participant.path, about, lambda: _all_sessions(participant, settings))
     table.insert(0, "participant", participant.name)
@@ -153,25 +140,12 @@ def _all_sessions(participant: Participant, settings: MeasureSettings) -> "pd.Da
     return with_unseen_areas(pd.concat(tables, ignore_index=True))
 
 
-def measure_or_say_why(participant: Participant) -> tuple[str, MeasuredParticipant | Unusable]:
-    """Return a participant's name and measures, or why there are none; a worker's function."""
+def measure_or_say_why(participant: Participant) -> tuple[str, Participant | Unusable]:
+    """Return a participant with measures, or why there are none; a worker's function."""
     try:
-        return participant.name, measure_ahead(participant)
+        return participant.name, replace(participant, measured=measures_of(participant))
     except Exception as error:  # noqa: BLE001 - one recording never stops a cohort
         return participant.name, Unusable.of(error)
-
-
-def measure_ahead(participant: Participant) -> MeasuredParticipant:
-    """Return a participant with computed measures; a worker's function."""
-    table = measures_of(participant)
-    return MeasuredParticipant(
-        participant.name,
-        participant.path,
-        participant.status,
-        participant.why,
-        table,
-        kind=participant.kind,
-    )
 
 
 def measure_session(

@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from labcrane.analysis.cohort import Cohort, find_cohort
-from labcrane.analysis.measures import MeasuredParticipant, measures_of
+from labcrane.analysis.measures import measures_of
 from labcrane.core.records import Event
 from labcrane.recording.labels import Labels
 from labcrane_tables.psychds import PsychDs
@@ -160,7 +161,7 @@ def test_psych_ds_describes_columns_by_the_names_they_are_written_under(
     """A task may name its results with dots, as scenarios do; CSV files have underscores."""
     person = cohort.included[0]
     table = measures_of(person).rename(columns={"peak_speed": "Peak.Speed"})
-    measured = MeasuredParticipant(person.name, person.path, person.status, person.why, table)
+    measured = replace(person, measured=table)
     PsychDs(PsychDsSettings()).export([measured], tmp_path)
     about = json.loads((tmp_path / "dataset_description.json").read_text(encoding="utf-8"))
     (path,) = (tmp_path / "data").iterdir()

@@ -97,39 +97,35 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
     started = datetime.fromisoformat(str(session.attrs["started"]))
     zero = session.streams["state"].time[0]
     raw.set_meas_date(started + timedelta(seconds=float(signal.time[0] - zero)))
-    onsets, labels = events_at(session, signal)
-    gaps = signal.holes.astype(np.float64)
-    marks = session.annotations
-    marks = marks.assign(at=signal.at(marks["time"].to_numpy(float))).dropna(subset="at")
-    lengths = (marks["until"] - marks["time"]).to_numpy(float)
-    faults = faults_of(session, chosen)
+    hz, marks, faults = signal.rate_hz, session.annotations, faults_of(session, chosen)
     began, ended = (
         signal.at(faults[edge].clip(signal.time[0], signal.time[-1]).to_numpy(float))
         for edge in ("start", "end")
     )
+    spans: list[tuple[float, float, str, tuple[str, ...]]] = [
+        *((at, 0.0, label, ()) for at, label in zip(*events_at(session, signal), strict=True)),
+        *((at, (end - at) / hz, GAP, ()) for at, end in signal.holes.astype(np.float64)),
+        *(
+            (at, mark["until"] - mark["time"], _marked(mark["text"]), ())
+            for at, mark in zip(
+                signal.at(marks["time"].to_numpy(float)), marks.to_dict("records"), strict=True
+            )
+            if np.isfinite(at)
+        ),
+        *(
+            (at, (end - at) / hz, f"{FAULT}/{plain(kind)}", (name,) * (name in signal.labels))
+            for at, end, kind, name in zip(
+                began, ended, faults["kind"], faults["channel"], strict=True
+            )
+        ),
+    ]
     raw.set_annotations(
         mne.Annotations(
-            np.concatenate([onsets, gaps[:, 0], marks["at"].to_numpy(float), began])
-            / signal.rate_hz,
-            np.concatenate(
-                [
-                    np.zeros(len(onsets)),
-                    np.ptp(gaps, axis=1) / signal.rate_hz,
-                    lengths,
-                    (ended - began) / signal.rate_hz,
-                ]
-            ),
-            [
-                *labels,
-                *[GAP] * len(gaps),
-                *map(_marked, marks["text"]),
-                *(f"{FAULT}/{plain(kind)}" for kind in faults["kind"]),
-            ],
+            [at / hz for at, _, _, _ in spans],
+            [length for _, length, _, _ in spans],
+            [text for _, _, text, _ in spans],
             orig_time=raw.info["meas_date"],
-            ch_names=[
-                *[()] * (len(onsets) + len(gaps) + len(marks)),
-                *((name,) if name in signal.labels else () for name in faults["channel"]),
-            ],
+            ch_names=[names for _, _, _, names in spans],
         ),
         verbose="error",
     )

@@ -204,6 +204,21 @@ class Results:
         return number if unit in {"", "1"} else f"{number} {unit}"
 
 
+def findings_of(
+    study: StudyMovements, everything: "pd.DataFrame", scores: "pd.DataFrame"
+) -> list[StudyFinding]:
+    """Return what came of every planned test: of movements, of practice, gaze and scores."""
+    return [
+        *of_outcomes(study),
+        *of_contrasts(study),
+        *of_trends(study),
+        *of_time_scales(study),
+        *of_practice(everything, study.factors, study.primary),
+        *of_gaze_measures(study),
+        *of_scores(scores, study.factors),
+    ]
+
+
 def of_outcomes(study: StudyMovements) -> Iterator[StudyFinding]:
     """Yield every test of every outcome over positions, distances, sides, phases and groups."""
     for measure in study.measures:
@@ -388,7 +403,7 @@ class _PlanRun:
             if plan.period:
                 confounded = "" if test.beside else ORDER
             elif columns == (plan.asked or tuple(each for each in columns if each != GROUP)):
-                confounded = plan.confounded(self.done, self.measure, test.people, columns)
+                confounded = self._confounds(test.people, columns)
             short = self._without(columns) if columns in planned else ()
             yield finding(name, replace(test, factor=name, confounded=confounded), short, columns)
         whole = len(cells.people) + len(cells.alone)
@@ -396,6 +411,9 @@ class _PlanRun:
             if columns not in tests:
                 no_test = Shortfall("", len(self.factors.people), whole, self._why(columns))
                 yield finding(self._name(columns), None, (no_test,), columns)
+
+    def _confounds(self, people: Collection[str], effect: Sequence[str]) -> str:
+        return confounds(self.done, self.measure, people, effect, self.plan.confusable)
 
     def _name(self, columns: tuple[str, ...]) -> str:
         return self.factors.named(":".join(columns)) + self.plan.suffix
@@ -468,7 +486,7 @@ class _PlanRun:
     def _why(self, columns: tuple[str, ...]) -> str:
         """Return why an effect cannot be tested."""
         if self.plan.beside:  # positions can be, and not without what pairs of targets add
-            apart = self.plan.confounded(self.done, self.measure, self._cells.people)
+            apart = self._confounds(self._cells.people, self.plan.asked)
             few = "there are too few people to estimate their variance"
             return f"positions cannot be distinguished from {apart}" if apart else few
         for column in columns:

@@ -133,16 +133,6 @@ class Plan:
             yield from self.tests(replace(cells, beside=cells.beside[:, :, :0]), measure)
         yield from found
 
-    def confounded(
-        self,
-        results: "pd.DataFrame",
-        measure: str,
-        people: Collection[str],
-        effect: Sequence[str] = (),
-    ) -> str:
-        """Return the confounds of an effect, by default the requested one; empty if none."""
-        return confounds(self.of(results), measure, people, effect or self.asked, self.confusable)
-
 
 def confounds(
     rows: "pd.DataFrame",

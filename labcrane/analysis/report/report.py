@@ -30,16 +30,7 @@ from labcrane.analysis.report.factors import (
     running,
     with_factors,
 )
-from labcrane.analysis.report.findings import (
-    Results,
-    of_contrasts,
-    of_gaze_measures,
-    of_outcomes,
-    of_practice,
-    of_scores,
-    of_time_scales,
-    of_trends,
-)
+from labcrane.analysis.report.findings import Results, findings_of
 from labcrane.analysis.report.html import Page
 from labcrane.analysis.report.protocols import in_words as protocols_in_words
 from labcrane.analysis.report.protocols import unlike_protocols
@@ -286,15 +277,7 @@ def _study(
         about,
         time_outs(everything, [*factors.between, *factors.by_phase, "distance"]),
         factors,
-        findings=[
-            *of_outcomes(study),
-            *of_contrasts(study),
-            *of_trends(study),
-            *of_time_scales(study),
-            *of_practice(everything, factors, primary),
-            *of_gaze_measures(study),
-            *of_scores(scores, factors),
-        ],
+        findings=findings_of(study, everything, scores),
         primary=tuple(primary),
         units=units,
     )
