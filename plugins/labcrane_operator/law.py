@@ -59,7 +59,7 @@ def follow(own: Numbers, x: float, y: float, z: float) -> int:
     """Ask for a velocity along the plan and towards it, with the hands' noise, from a tip in m.
 
     The plan is the straight movement of least jerk (Flash and Hogan 1985). Its pace is below 1 when
-    the machine lags behind.
+    the machine lags behind; a machine that an assistant has brought ahead is not waited for.
     """
     if own[PLANNED] == 0.0:
         return STANDS
@@ -76,8 +76,10 @@ def follow(own: Numbers, x: float, y: float, z: float) -> int:
         pz = own[START + 2] + share * own[WAY + 2]
         vx, vy, vz = pace * own[WAY], pace * own[WAY + 1], pace * own[WAY + 2]
     ex, ey, ez = px - x, py - y, pz - z
-    pace = 2.0 - 2.0 * math.sqrt(ex * ex + ey * ey + ez * ez) / own[PATIENCE]
-    pace = 1.0 if pace > 1.0 else pace if pace > 0.0 else 0.0
+    pace = 1.0
+    if ex * own[WAY] + ey * own[WAY + 1] + ez * own[WAY + 2] > 0.0:
+        pace = 2.0 - 2.0 * math.sqrt(ex * ex + ey * ey + ez * ez) / own[PATIENCE]
+        pace = 1.0 if pace > 1.0 else pace if pace > 0.0 else 0.0
     if own[DOING] == MOVING:
         own[TIME] += pace * own[DT]
         if own[TIME] >= own[DURATION]:
