@@ -256,6 +256,7 @@ def measure(movement: Movement, machine: Machine, settings: MeasureSettings) -> 
         "ldlj": ldlj(movement.velocity, movement.rate_hz, span, low_pass_hz=settings.low_pass_hz),
         **_sticks(movement, span, settings),
         **_machine_use(movement, span, machine, settings),
+        **_assistance(movement, span),
     }
 
 
@@ -317,6 +318,28 @@ def _deflection(axes: Mapping[str, FloatArray], stick: str) -> FloatArray:
     own = [values for name, values in axes.items() if name.rpartition(".")[0] == stick]
     deflection: FloatArray = np.linalg.norm(own, axis=0)
     return deflection
+
+
+OF_ASSISTANCE = ("assist_share", "operator_part", "assistant_part", "opposition_time")
+"""Measures of a study with an assistant."""
+
+
+def _assistance(movement: Movement, span: slice) -> dict[str, float]:
+    """Return who moved the machine; NaN without an assistant."""
+    if not movement.assist:
+        return dict.fromkeys(OF_ASSISTANCE, float("nan"))
+    share, operator, assistant = (
+        movement.assist[name][span] for name in ("share", "operator", "assistant")
+    )
+    paths = [
+        float(np.linalg.norm(part, axis=1).sum())
+        for part in ((1.0 - share) * operator, share * assistant)
+    ]
+    whole = sum(paths)
+    against = int(((operator * assistant).sum(axis=1) < 0.0).sum())
+    parts = [path / whole if whole else float("nan") for path in paths]
+    found = (float(share.mean()), *parts, against / movement.rate_hz)
+    return dict(zip(OF_ASSISTANCE, found, strict=True))
 
 
 def _machine_use(

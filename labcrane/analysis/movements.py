@@ -1,7 +1,7 @@
 """One movement's arrays, cut out of a session."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -26,10 +26,14 @@ TICKS = 1 << 16
 USED: Mapping[str, tuple[str, ...]] = {
     "loop": ("due", "trial", "paused", "elapsed"),
     "input": (),
-    "command": ("command",),
+    "command": ("command", "assist.share", "assist.operator", "assist.assistant"),
     "state": ("tip.position", "tip.velocity", "joint.angle"),
 }
 """Signals that a movement has, by group; all of them where none is named."""
+
+
+HANDS = ("operator", "assistant")
+"""Who moves the machine in a study with an assistant."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,9 @@ class Movement:
         By name, ``left.x``; each of shape ``(n,)``, in [-1, 1].
     command, angles
         Joint speeds asked for in rad/s and joint angles in rad, shape ``(n, n_joints)``.
+    assist
+        With an assistant: its ``share``, shape ``(n, 1)``, and the joint speeds in rad/s that
+        ``operator`` and ``assistant`` asked for, shape ``(n, n_joints)``; empty without one.
     """
 
     row: Mapping[str, Any]
@@ -63,6 +70,7 @@ class Movement:
     axes: Mapping[str, FloatArray]
     command: FloatArray
     angles: FloatArray
+    assist: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @cached_property
     def speed(self) -> FloatArray:
@@ -175,8 +183,14 @@ def cut(frames: Groups, trials: "pd.DataFrame", rate_hz: float) -> Iterator[Move
     due, trial, elapsed = (_array(loop, [name])[:, 0] for name in ("due", "trial", "elapsed"))
     running = _array(loop, ["paused"])[:, 0] == 0.0
     tip, velocity, angles = (_array(state, _below(state, name)) for name in USED["state"])
-    command = _array(frames["command"], _below(frames["command"], "command"))
-    axes = {name: _array(frames["input"], [name])[:, 0] for name in map(str, frames["input"])}
+    asked = frames["command"]
+    command = _array(asked, _below(asked, "command"))
+    assist = {}
+    if "assist.share" in asked:
+        assist = {who: _array(asked, _below(asked, f"assist.{who}")) for who in HANDS}
+        assist["share"] = _array(asked, ["assist.share"])
+    own = [name for name in map(str, frames["input"]) if not name.startswith("assist.")]
+    axes = {name: _array(frames["input"], [name])[:, 0] for name in own}
     for row, edges in zip(trials.to_dict("records"), _edges(trials).T, strict=True):
         first, last = np.searchsorted(due, edges)
         ticks = np.arange(first, last)
@@ -191,6 +205,7 @@ def cut(frames: Groups, trials: "pd.DataFrame", rate_hz: float) -> Iterator[Move
             axes={name: values[ticks] for name, values in axes.items()},
             command=command[ticks],
             angles=angles[ticks],
+            assist={name: values[ticks] for name, values in assist.items()},
         )
 
 

@@ -10,6 +10,7 @@ from labcrane.core.signals import Layout, Signal
 from labcrane.design.plan import plan_session
 from labcrane.files.pseudonyms import pseudonyms
 from labcrane.protocol.design import CONDITION
+from labcrane.protocol.protocol import ASSIST
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.frame_log import LOOP
@@ -18,7 +19,7 @@ from labcrane.recording.trial_columns import OWN, trial_definitions, trial_units
 CORE = "labcrane"
 ABOUT = (
     "trial", "attempt", "block", "block_name", "practice", "reference", "group", CONDITION,
-    "feedback", "outcome", "completion", "track_success",
+    "feedback", ASSIST, "outcome", "completion", "track_success",
 )  # fmt: skip
 """labcrane's own columns of the trial table, in addition to those with units."""
 
@@ -55,6 +56,8 @@ def codebook(study: Study) -> list[CodebookColumn]:
     parts = Rig.build(study, simulated=False)
     tasks = {choice.name: choice for choice in study.task_choices.values()}
     task_source = ", ".join(f"{choice.plugin}: {choice.name}" for choice in tasks.values())
+    helper = study.choices.get(ASSIST)
+    assist = f"{helper.plugin}: {helper.name}" if helper else ""
     found = [CodebookColumn("loop", each.name, each.unit, CORE, each.definition) for each in LOOP]
     for table, component, source in (
         ("input", parts.input, f"{study.input.plugin}: {study.input.name}"),
@@ -64,7 +67,10 @@ def codebook(study: Study) -> list[CodebookColumn]:
     ):
         layout = Layout(table, component.signals)
         names = zip(layout.columns, layout.units, strict=True)
-        found += [CodebookColumn(table, name, unit, source) for name, unit in names]
+        found += [
+            CodebookColumn(table, name, unit, assist if name.startswith(f"{ASSIST}.") else source)
+            for name, unit in names
+        ]
     found += [CodebookColumn("events", name, unit, CORE) for name, unit in EVENTS]
     return found + _trials(study)
 
@@ -100,6 +106,11 @@ def _has(study: Study, name: str) -> bool:
         "group": bool(protocol.design.groups),
         CONDITION: any(step.block is not None and step.block.condition for step in steps),
         "feedback": bool(protocol.switched),
+        ASSIST: any(
+            protocol.design.tracks[step.block.track].factor == ASSIST
+            for step in steps
+            if step.block is not None and step.block.track
+        ),
         **dict.fromkeys(
             ("track", "track_level", "track_success"),
             any(step.block is not None and step.block.track for step in steps),

@@ -13,6 +13,7 @@ from labcrane.design.seeds import derive
 from labcrane.design.slots import group_of, place_of
 from labcrane.design.tracks import PlannedTrack, plan_rounds, standing
 from labcrane.protocol.design import AS_WRITTEN, CONDITION, Criterion, Switch
+from labcrane.protocol.protocol import ASSIST
 from labcrane.protocol.steps import READING_S, Block, Step
 from labcrane.protocol.study import Study
 
@@ -273,7 +274,10 @@ class Planner:
         track = self._study.protocol.design.tracks[block.track]
         rounds = {}
         for level in track.levels:
-            trials = task.plan({**levels, track.factor: (level,)})
+            if track.factor == ASSIST:
+                trials = [_with(ASSIST, level, each) for each in task.plan(levels)]
+            else:
+                trials = list(task.plan({**levels, track.factor: (level,)}))
             rounds[level] = plan_rounds(block.track, level, _of_condition(condition, trials))
         size = len(next(iter(rounds.values())))
         return PlannedTrack(block.track, track, self._trials + 1, size * track.rounds, rounds)
@@ -337,7 +341,12 @@ def _of_condition(condition: str, trials: Sequence[PlannedTrial]) -> Sequence[Pl
     """Return trials with their condition within participants; unchanged without one."""
     if not condition:
         return trials
-    return [replace(each, condition={**each.condition, CONDITION: condition}) for each in trials]
+    return [_with(CONDITION, condition, each) for each in trials]
+
+
+def _with(column: str, level: str, trial: PlannedTrial) -> PlannedTrial:
+    """Return a trial with one more variable of its condition."""
+    return replace(trial, condition={**trial.condition, column: level})
 
 
 def conditions_of(study: Study, participant: str, group: str, place: int) -> tuple[str, ...]:

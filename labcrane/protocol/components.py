@@ -1,6 +1,6 @@
 """Components that a protocol uses, found among those installed."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -69,14 +69,21 @@ class ComponentResolver:
         those that they give, can be looked up all the same."""
 
     def choose(
-        self, role: type[RoleT], place: Place, default: Use | None = None
+        self,
+        role: type[RoleT],
+        place: Place,
+        default: Use | None = None,
+        beside: Container[str] = (),
     ) -> ComponentSpec | None:
-        """Return the component that the protocol uses at ``place``, or note why there is none."""
+        """Return the component that the protocol uses at ``place``, or note why there is none.
+
+        The keys ``beside`` its settings are the protocol's own.
+        """
         written = self._at(place)
         if written is None and default is not None:
             use = default
         elif isinstance(written, dict) and isinstance(written.get("use"), str):
-            use = Use.model_validate(written)
+            use = Use.model_validate({k: v for k, v in written.items() if k not in beside})
         else:
             return None  # noted by the protocol's own check
         return self._choice(role, use, place, (*place, "use"))

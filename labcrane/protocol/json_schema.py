@@ -11,7 +11,7 @@ from labcrane.core.settings import Settings
 from labcrane.files.model import UNIT
 from labcrane.files.units import KINDS, SPELT
 from labcrane.machines.library import machine_names
-from labcrane.protocol.protocol import protocol_model
+from labcrane.protocol.protocol import ASSIST, OF_ASSIST, Assist, protocol_model
 from labcrane.protocol.steps import Block, Break, Fixation, Session
 from labcrane.registry.hookspecs import roles_by_key
 from labcrane.registry.offers import Offer
@@ -31,14 +31,16 @@ def protocol_schema(registry: Registry) -> Schema:
         for offer in registry.offers[role].values()
     }
     model = protocol_model()
-    models: list[type[Settings]] = [model, Session, Block, Break, Fixation, *settings]
+    models: list[type[Settings]] = [model, Assist, Session, Block, Break, Fixation, *settings]
     references, whole = models_json_schema([(each, "validation") for each in models])
     shared: Schema = whole["$defs"]
     named = {each: shared[ref["$ref"].split("/")[-1]] for (each, _), ref in references.items()}
 
     protocol = named[model]
+    own = {key: named[Assist]["properties"][key] for key in OF_ASSIST}
     for key, of in one.items():
-        protocol["properties"][key] = _use(registry, of, named)
+        protocol["properties"][key] = _use(registry, of, named, own if key == ASSIST else {})
+    protocol["properties"][ASSIST]["required"].append("share")
     for key, of in by_name.items():
         place = protocol["properties"][key]
         for part in (place, *place.get("anyOf", ())):  # null may select a default
@@ -101,9 +103,15 @@ def _or_quantity(schema: Schema) -> Schema:
 
 
 def _use(
-    registry: Registry, roles: tuple[type[Component], ...], named: Mapping[Any, Schema]
+    registry: Registry,
+    roles: tuple[type[Component], ...],
+    named: Mapping[Any, Schema],
+    own: Schema | None = None,
 ) -> Schema:
-    """Return the schema of ``{use: NAME, ...}``; the name decides which other keys there are."""
+    """Return the schema of ``{use: NAME, ...}``; the name decides which other keys there are.
+
+    Those that are the protocol's ``own`` are beside them.
+    """
     offers = {name: each for role in roles for name, each in registry.offers[role].items()}
     return {
         "type": "object",
@@ -112,16 +120,16 @@ def _use(
         "allOf": [
             {
                 "if": {"properties": {"use": {"const": name}}, "required": ["use"]},
-                "then": _with_use(offer, named),
+                "then": _with_use(offer, named, own or {}),
             }
             for name, offer in sorted(offers.items())
         ],
     }
 
 
-def _with_use(offer: Offer[Component], named: Mapping[Any, Schema]) -> Schema:
+def _with_use(offer: Offer[Component], named: Mapping[Any, Schema], own: Schema) -> Schema:
     model = deepcopy(named[offer.settings])
-    model["properties"] = {"use": {"const": offer.name}, **model.get("properties", {})}
+    model["properties"] = {"use": {"const": offer.name}, **own, **model.get("properties", {})}
     return model
 
 

@@ -2,6 +2,7 @@
 
 import inspect
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -21,6 +22,9 @@ from pydantic_core import CoreSchema
 
 from labcrane.analysis.presented import PresentedLimits
 from labcrane.analysis.scoring.settings import IndicatorSettings
+from labcrane.core.records import Trial
+from labcrane.core.references import ButtonName
+from labcrane.core.signals import Signal
 from labcrane.files.model import AtMost, was_run
 from labcrane.files.names import misfit
 from labcrane.files.yaml import YamlFile
@@ -57,6 +61,51 @@ class Use(Section):
 
 
 DEFAULT_OPERATOR = Use(use="simulated_operator")
+
+SharePart = Annotated[float, Field(ge=0.0, le=1.0)]
+ASSIST = "assist"
+"""Factor of a track that chooses the assistant's share, and the column of what it chose."""
+
+
+class Assist(Use):
+    """An input device that moves the machine together with the operator: shared control.
+
+    The command of each joint is ``(1 - share)`` times the operator's plus ``share`` times the
+    assistant's. Then the machine's limits act.
+    """
+
+    share: SharePart | Annotated[dict[FactorName, SharePart], Field(min_length=1)]
+    """The assistant's share of the command in every trial, 0 to 1; or shares by name, which
+    groups, conditions and blocks switch on as they do feedback: ``{half: 0.5, full: 1}``. A trial
+    with none of them on has the share 0. A track with ``factor: assist`` chooses among them."""
+
+    takeover: ButtonName = ""
+    """A button of the input: while it is pressed, the operator has the whole command."""
+
+    @property
+    def levels(self) -> dict[str, float]:
+        """The shares that have names."""
+        return self.share if isinstance(self.share, dict) else {}
+
+    @staticmethod
+    def signals(joints: Sequence[str]) -> tuple[Signal, ...]:
+        """Return what is recorded: the share in effect, and what either asks the joints for."""
+        return (
+            Signal(f"{ASSIST}.share", "1"),
+            Signal(f"{ASSIST}.operator", "rad/s", tuple(joints)),
+            Signal(f"{ASSIST}.assistant", "rad/s", tuple(joints)),
+        )
+
+    def share_in(self, trial: Trial) -> float:
+        """Return the assistant's share in a trial."""
+        if not isinstance(self.share, dict):
+            return self.share
+        on = (trial.planned.condition.get(ASSIST), *trial.active)
+        return next((part for name, part in self.share.items() if name in on), 0.0)
+
+
+OF_ASSIST = ("share", "takeover")
+"""Keys of ``assist`` that are not settings of the device."""
 
 
 class Participants(Section):
@@ -153,6 +202,9 @@ class Protocol(Section):
     operator: Use = DEFAULT_OPERATOR
     """The simulated operator, which moves the input in simulations."""
 
+    assist: Assist | None = None
+    """An assistant beside the operator; none by default."""
+
     scheme: Use
     """Maps the operator's axes to commands."""
 
@@ -223,8 +275,8 @@ class Protocol(Section):
 
     @property
     def switched(self) -> tuple[str, ...]:
-        """Names of all that trials switch on: feedback and secondary tasks."""
-        return (*self.feedback, *self.secondary)
+        """Names of all that trials switch on: feedback, secondary tasks, shares of assist."""
+        return (*self.feedback, *self.secondary, *(self.assist.levels if self.assist else ()))
 
 
 def protocol_model() -> type[Protocol]:

@@ -17,6 +17,7 @@ from labcrane.files.system import is_file, is_there
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
 from labcrane.protocol.components import ComponentSpec
+from labcrane.protocol.protocol import ASSIST, Assist
 from labcrane.protocol.referenced_files import paths_in, used
 
 Known = frozenset[str] | None
@@ -36,7 +37,7 @@ OWNERS: Mapping[str, str] = {
 }
 """Owners of the names of a kind, for messages; other kinds belong to the study."""
 
-READ_BY_BUILDING = frozenset({"input", "operator", "scheme", "dynamics"})
+READ_BY_BUILDING = frozenset({"input", ASSIST, "operator", "scheme", "dynamics"})
 """Keys of components that open the files of their settings when they are built: a check builds
 those that name any. Views and sounds are built by a rehearsal."""
 
@@ -85,6 +86,7 @@ class ReferenceChecker:
     def check(self) -> None:
         """Look up the names in every component's settings, and those that they need implicitly."""
         self._check_sections()
+        self._check_assistant()
         for place, choice in self._components.items():
             before = self._source.wrong
             settings = choice.settings
@@ -131,13 +133,16 @@ class ReferenceChecker:
         for place, section in self._sections.items():
             before = self._source.wrong
             for mention in mentioned(section):
+                at = (*place, *mention.place)
                 if mention.mark == Reference("file"):
-                    self._is_there((*place, *mention.place), mention.value)
+                    self._is_there(at, mention.value)
+                elif isinstance(mention.mark, Reference):
+                    self._refers(at, mention, mention.mark)
             if self._source.wrong == before:
                 list(self._needed(place, section))  # looks into its files
 
     def _refers(
-        self, at: Place, mention: Mentioned, mark: Reference, choice: ComponentSpec
+        self, at: Place, mention: Mentioned, mark: Reference, choice: ComponentSpec | None = None
     ) -> None:
         written = mention.value
         known = self._holds(mark, mention, choice, at)
@@ -168,25 +173,47 @@ class ReferenceChecker:
 
         Each comes with the place where it is named, and its name.
         """
-        for place, choice in self._components.items():
+        parts = [(place, choice.settings) for place, choice in self._components.items()]
+        for place, settings in (*parts, *self._sections.items()):
             if place in {("input",), ("operator",)}:
                 continue
-            named = [
-                ((*place, *each.place), each.mark.kind, each.mark.bare(str(each.value)))
-                for each in mentioned(choice.settings)
-                if isinstance(each.mark, Reference) and not (each.mark.own or each.mark.of)
-            ]
-            needed = self._needed(place, choice.settings)
-            named += [(place, kind, name) for kind, names in needed for name in names]
-            for at, kind, name in named:
-                if kind in {"axis", "button"} and name in (self._names(kind, at) or ()):
+            for at, kind, name in self._controls(place, settings):
+                if name in (self._names(kind, at) or ()):
                     has = self._found(kind, "operator")
                     if has is not None and name not in has:
                         yield at, name
 
+    def _controls(self, place: Place, settings: Settings) -> Iterator[tuple[Place, str, str]]:
+        """Yield the axes and buttons that settings name: where, which of the two, and the name."""
+        for each in mentioned(settings):
+            mark = each.mark
+            if not isinstance(mark, Reference) or mark.own or mark.of:
+                continue
+            if mark.kind in {"axis", "button"}:
+                yield (*place, *each.place), mark.kind, mark.bare(str(each.value))
+        for kind, names in self._needed(place, settings):
+            if kind in {"axis", "button"}:
+                yield from ((place, kind, name) for name in names)
+
+    def _check_assistant(self) -> None:
+        """Note axes and buttons of the scheme that the assistant does not have."""
+        scheme = self._components.get(("scheme",))
+        has = self._found("axis", ASSIST)
+        if scheme is None or has is None:
+            return
+        named = [name for _, _, name in self._controls(("scheme",), scheme.settings)]
+        if lacks := [name for name in dict.fromkeys(named) if name not in has]:
+            message = (
+                f"assist moves {', '.join(sorted(has))}, and the scheme uses {', '.join(lacks)}; "
+                f"name what it uses, as axes: [{', '.join(dict.fromkeys(named))}]"
+            )
+            self._source.problem((ASSIST, "use"), message)
+
     def _holds(
-        self, mark: Reference, mention: Mentioned, choice: ComponentSpec, at: Place
+        self, mark: Reference, mention: Mentioned, choice: ComponentSpec | None, at: Place
     ) -> Known:
+        if choice is None:
+            return self._names(mark.kind, at)
         if mark.of:
             view = self._components.get(("views", str(getattr(choice.settings, mark.of, ""))))
             return self._own(view, mark.kind) if view else None  # a missing view is reported there
@@ -295,6 +322,8 @@ class ReferenceChecker:
         if kind == "signal":
             given = self._of([("scheme",), ("dynamics",)], kind)
             shown = {c for each in self._tasks.values() for s in each.signals for c in s.columns}
+            if (ASSIST,) in self._components:
+                shown |= {c for s in Assist.signals(self._machine.names) for c in s.columns}
             return None if given is None or not self._all_tasks else given | shown
         if kind == "event":
             given = self._of(self._places("tasks"), kind)

@@ -8,6 +8,7 @@ from labcrane.core.records import Run, Value
 from labcrane.core.roles import Component, Controller, Dynamics, InputDevice, Task
 from labcrane.core.signals import Layout, Signal
 from labcrane.errors import ProtocolError
+from labcrane.protocol.assisted import Assisted, FourHands
 from labcrane.protocol.study import Study
 
 
@@ -45,12 +46,15 @@ class Rig:
         """Build, but do not open, what ``study`` names; a simulated operator replaces the input."""
         machine = study.machine
         device = (study.operator if simulated else study.input).build(machine)
-        controller = study.scheme.build(machine)
+        controller = build_controller(study)
         dynamics = study.dynamics.build(machine)
         # The registry filed each offer under its role.
         assert isinstance(device, InputDevice)  # noqa: S101
-        assert isinstance(controller, Controller)  # noqa: S101
         assert isinstance(dynamics, Dynamics)  # noqa: S101
+        if isinstance(controller, Assisted):
+            assistant = study.choices["assist"].build(machine)
+            assert isinstance(assistant, InputDevice)  # noqa: S101
+            device = FourHands(device, assistant, controller.inverse_of_assistant)
         return cls(device, controller, dynamics, study.tasks)
 
     def describe(self, study: Study, participant_seed: int) -> Run:
@@ -77,6 +81,17 @@ class Rig:
                 closing.callback(component.close)
                 component.open(run)
             yield run
+
+
+def build_controller(study: Study) -> Controller:
+    """Build the scheme of a study; with an assistant, one that blends two commands."""
+    scheme, assist = study.scheme.build(study.machine), study.protocol.assist
+    assert isinstance(scheme, Controller)  # noqa: S101 - the registry filed it under its role
+    if assist is None:
+        return scheme
+    second = study.scheme.build(study.machine)
+    assert isinstance(second, Controller)  # noqa: S101
+    return Assisted(scheme, second, assist)
 
 
 def _task_signals(tasks: Mapping[str, Task]) -> tuple[Signal, ...]:

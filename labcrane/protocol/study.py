@@ -26,7 +26,7 @@ from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
 from labcrane.protocol.components import ComponentResolver, ComponentSpec
 from labcrane.protocol.design import CONDITION, Switch
-from labcrane.protocol.protocol import DEFAULT_OPERATOR, Protocol, read
+from labcrane.protocol.protocol import ASSIST, DEFAULT_OPERATOR, OF_ASSIST, Protocol, read
 from labcrane.protocol.references import Parts, ReferenceChecker, twice
 from labcrane.protocol.steps import Block
 from labcrane.protocol.tracks import Track
@@ -180,6 +180,8 @@ def trials_of(block: Block, protocol: Protocol, task: Task) -> tuple[float, floa
     """Return about how many trials a block has, and how long they take in s, without a plan."""
     share = float(block.repeat * (block.until.rounds if block.until else 1))
     track = protocol.design.tracks.get(block.track)
+    if track is not None and track.factor == ASSIST:
+        share *= track.rounds
     for factor, levels in task.factors().items():
         if track is not None and factor == track.factor:
             share *= track.rounds / len(levels)
@@ -189,6 +191,12 @@ def trials_of(block: Block, protocol: Protocol, task: Task) -> tuple[float, floa
         share *= times if not isinstance(used, int) else min(used / len(levels), times)
     once = task.plan(task.factors())
     return len(once) * share, sum(trial.expected_s for trial in once) * share
+
+
+def factors_of(task: Task, protocol: Protocol) -> dict[str, Sequence[str]]:
+    """Return the levels of each factor that a track can choose: the task's, and the shares."""
+    levels = protocol.assist.levels if protocol.assist else {}
+    return {**task.factors(), **({ASSIST: tuple(levels)} if levels else {})}
 
 
 NO_CONDITIONS = (
@@ -323,7 +331,7 @@ class Checker:
             self._source.problem((*place, "track"), f"there is no track {block.track!r}; {there}")
             return False
         at: Place = ("design", "tracks", block.track)
-        factors = task.factors()
+        factors = factors_of(task, self._protocol)
         if track.factor not in factors:
             there = nearest(track.factor, factors, "it varies")
             message = f"task {block.task!r} does not vary {track.factor!r}; {there}"
@@ -357,6 +365,8 @@ class Checker:
 
     def _alike(self, at: Place, track: Track, task: Task) -> bool:
         """Note levels with other trials than the first: a round would not be a round."""
+        if track.factor == ASSIST:
+            return True  # the same trials at each share
         made = {
             level: [each.counted for each in task.plan({**task.factors(), track.factor: (level,)})]
             for level in track.levels
@@ -484,12 +494,40 @@ class Checker:
             ("design", "conditions", name): switch
             for name, switch in self._protocol.design.conditions.items()
         }
-        switches |= {(*place, "feedback"): block.feedback for place, block in self._blocks()}
+        switches |= {
+            (*place, "feedback"): block.feedback
+            for place, block in self._blocks()
+            if block.condition is None
+        }
+        groups = {
+            ("design", "groups", name): on for name, on in self._protocol.design.groups.items()
+        }
+        self._check_shares(groups | switches)
         for at, switch in switches.items():
             if switch == "group" and not self._protocol.design.groups:
                 self._source.problem(at, NO_GROUPS)
             elif isinstance(switch, tuple):
                 self._feedback_exists(at, switch)
+
+    def _check_shares(self, switches: Mapping[Place, Switch]) -> None:
+        """Note what switches on more shares of the assistant than a trial has."""
+        shares = self._protocol.assist.levels if self._protocol.assist else {}
+        tracks = self._protocol.design.tracks
+        tracked = {
+            (*place, "feedback")
+            for place, block in self._blocks()
+            if block.track in tracks and tracks[block.track].factor == ASSIST
+        }
+        for at, switch in switches.items():
+            names = self._protocol.switched if switch == "all" else switch
+            on = [name for name in names if name in shares]
+            if len(on) > (0 if at in tracked else 1):
+                chosen = "and its track chooses the share" if at in tracked else "of one trial"
+                message = (
+                    f"feedback switches on {', '.join(on)}, shares of assist, {chosen}; list what "
+                    "is on, with one share at most, or none where a track chooses it"
+                )
+                self._source.problem(at, message)
 
     def _feedback_exists(self, place: Place, names: Sequence[str]) -> None:
         for at, name in enumerate(names):
@@ -521,6 +559,7 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     device = chooser.choose(InputDevice, ("input",))
     operator = chooser.choose(InputDevice, ("operator",), DEFAULT_OPERATOR)
     scheme = chooser.choose(Controller, ("scheme",))
+    assist = chooser.choose(InputDevice, (ASSIST,), beside=OF_ASSIST)
     dynamics = chooser.choose(Dynamics, ("dynamics",))
     choices = chooser.choose_several(Task, "tasks")
     tasks = chooser.build(Task, "tasks", choices, machine[0]) if machine else {}
@@ -528,6 +567,10 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     secondary = chooser.choose_several(SecondaryTask, "secondary")
     for name in secondary.keys() & {*cues, *sounds, *views}:
         source.problem(("secondary", name), f"{name!r} is already the name of a feedback", key=True)
+    shares = protocol.assist.levels if protocol and protocol.assist else {}
+    for name in shares.keys() & {*cues, *sounds, *views, *secondary}:
+        message = f"{name!r} is already the name of a feedback or a secondary task"
+        source.problem((ASSIST, "share", name), message, key=True)
     if secondary and machine:
         from labcrane.protocol.beside import Beside  # noqa: PLC0415 - it loads numpy
 
@@ -555,7 +598,7 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
         "monitors": monitors or {},
         "recordings": recordings,
     }
-    roles = {"input": device, "scheme": scheme, "dynamics": dynamics}
+    roles = {"input": device, ASSIST: assist, "scheme": scheme, "dynamics": dynamics}
     there = {part: choice for part, choice in roles.items() if choice}
     there |= {f"{kind}.{name}": each for kind, of in named.items() for name, each in of.items()}
     there |= others
@@ -564,8 +607,10 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
         places: dict[Place, ComponentSpec] = {tuple(p.split(".", 1)): c for p, c in there.items()}
         places |= {("operator",): operator} if operator else {}
         faulty = chooser.but_for_numbers
-        pages: dict[Place, Settings] = {("page",): protocol.page} if protocol else {}
-        parts = Parts(machine[0], places | faulty, tasks, pages, {*faulty})
+        sections: dict[Place, Settings] = {("page",): protocol.page} if protocol else {}
+        if protocol and protocol.assist:
+            sections[(ASSIST,)] = protocol.assist
+        parts = Parts(machine[0], places | faulty, tasks, sections, {*faulty})
         references = ReferenceChecker(source, parts)
         references.check()
         beyond = tuple(references.beyond_the_operator())

@@ -35,6 +35,7 @@ OWN = (
     Signal("condition", "", definition="the condition within participants of the design"),
     Signal("track", "", definition="the adaptive track that chose the trial's level"),
     Signal("track_level", "", definition="the level that it chose"),
+    Signal("assist", "", definition="the assistant's share that the track chose, by its name"),
     Signal("reference", "1", definition="1 where the trial sets the indicator's reference, else 0"),
     Signal("feedback", "", definition="what was switched on in the trial, joined by +; or none"),
     Signal(

@@ -171,7 +171,7 @@ ROLES: Mapping[type[Component], RoleEntry] = {
         labcrane_inputs,
         "input",
         "a device that the operator moves",
-        ("input", "operator"),
+        ("input", "assist", "operator"),
         returns={"read": NUMBERS},
     ),
     Controller: RoleEntry(

@@ -19,7 +19,7 @@ from labcrane.core.clock import SystemClock, Tick
 from labcrane.core.records import Frame, Run
 from labcrane.design.plan import plan_session
 from labcrane.errors import ProtocolError, RecordingError
-from labcrane.protocol.rig import Rig
+from labcrane.protocol.rig import Rig, build_controller
 from labcrane.protocol.study import Study
 from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.frame_log import FrameLog, FrameRow, columns, sizes
@@ -141,8 +141,7 @@ def _run(
     script = Script(record)
     participant = DataFolder.pseudonym(str(record.context["participant"]))
     plan = plan_session(study, participant, session)
-    machine = study.machine
-    controller, dynamics = study.scheme.build(machine), study.dynamics.build(machine)
+    controller, dynamics = build_controller(study), study.dynamics.build(study.machine)
     rig = Rig(script.input, controller, dynamics, study.tasks)  # type: ignore[arg-type]
     with ExitStack() as closing:
         run = closing.enter_context(rig.opened(study, plan.seed))

@@ -188,6 +188,8 @@ def differing_parts(record: SessionRecord, study: Study) -> tuple[str, ...]:
         if part.startswith(MOVING):
             recorded, now = context["components"].get(part), choice.described(study.path.parent)
             found += _compared(part, recorded, now)
+    was = parse_yaml(record.protocol, "the protocol", recorded=True)
+    found += _compared("assist", was.get("assist"), study.written.get("assist"))
     found += _compared("rate_hz", float(context["rate_hz"]), study.protocol.rate_hz)
     return tuple(found)
 

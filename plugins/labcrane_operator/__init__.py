@@ -1,9 +1,9 @@
-"""Operators without a person: a simulated one, and a recorded one."""
+"""Operators without a person: simulated, recorded, and one that goes straight to the target."""
 
 from collections.abc import Sequence
 
 from labcrane import InputDevice, Machine, Offer, hookimpl, offer
-from labcrane_operator.settings import OperatorSettings, RecordedSettings
+from labcrane_operator.settings import OperatorSettings, RecordedSettings, TowardSettings
 
 labcrane_api = 1
 
@@ -20,7 +20,13 @@ def labcrane_inputs() -> Sequence[Offer[InputDevice]]:
 
         return RecordedInput(settings)
 
+    def toward(settings: TowardSettings, machine: Machine) -> InputDevice:
+        from labcrane_operator.toward import TowardTarget
+
+        return TowardTarget(settings)
+
     return (
         offer("simulated_operator", OperatorSettings, simulated),
         offer("recorded", RecordedSettings, recorded),
+        offer("toward_target", TowardSettings, toward),
     )

@@ -36,8 +36,10 @@ class RecordedInput(InputDevice):
         except RecordingError as error:
             raise ProtocolError(str(error), at=("session",)) from error
         recorded = record.streams["input"]
-        self.signals = signals_of(tuple(map(str, recorded.data)), recorded.units)
-        self._axes: FloatArray = recorded.data.to_numpy(np.float64)
+        # The hands of an assistant are not the operator's.
+        names = [name for name in map(str, recorded.data) if not name.startswith("assist.")]
+        self.signals = signals_of(names, recorded.units)
+        self._axes: FloatArray = recorded.data[names].to_numpy(np.float64)
         self._rate_hz = float(record.attrs["rate_hz"])
         self._at_rest = np.zeros(self._axes.shape[1])
 

@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import Annotated
 
 from pydantic import (
+    AfterValidator,
     Field,
     NonNegativeFloat,
     PositiveFloat,
     PositiveInt,
-    field_validator,
     model_validator,
 )
 
@@ -19,6 +19,19 @@ CONNECTED = "operator.connected"
 """Axis that reports that the operator is connected, if it has no joysticks."""
 
 STICK = ("x", "y", "twist", "slider", "trigger", "connected")
+
+
+def _have_no_sign(axes: tuple[str, ...]) -> tuple[str, ...]:
+    if turned := [axis for axis in axes if axis.startswith("-")]:
+        raise ValueError(
+            f"{turned[0]!r} is reversed, but only a scheme's map can reverse an axis; write "
+            f"{turned[0][1:]}"
+        )
+    return axes
+
+
+Axes = Annotated[tuple[InputAxis, ...], AfterValidator(_have_no_sign), Once()]
+"""Axes of the input, as they are."""
 
 
 class ResponseSettings(Settings):
@@ -104,7 +117,7 @@ class OperatorSettings(Settings):
     """Distance from the target's centre that the operator treats as inside, as a fraction of its
     radius."""
 
-    axes: Annotated[tuple[InputAxis, ...], Once()] = ()
+    axes: Axes = ()
     """Axes of the input that the operator replaces, if these are not two joysticks:
     ``[keyboard.slew, keyboard.boom]``. The default is the axes of two joysticks."""
 
@@ -113,16 +126,6 @@ class OperatorSettings(Settings):
 
     response: ResponseSettings | None = None
     """How the operator responds to a secondary task; null: not at all."""
-
-    @field_validator("axes")
-    @classmethod
-    def _have_no_sign(cls, axes: tuple[str, ...]) -> tuple[str, ...]:
-        if turned := [axis for axis in axes if axis.startswith("-")]:
-            raise ValueError(
-                f"{turned[0]!r} is reversed, but only a scheme's map can reverse an axis; write "
-                f"{turned[0][1:]}"
-            )
-        return axes
 
     @model_validator(mode="after")
     def _button_is_beside_axes(self) -> "OperatorSettings":
@@ -143,6 +146,24 @@ class OperatorSettings(Settings):
             "axis": [f"{side}.{part}" for side in sides for part in STICK],
             "button": [f"{side}.trigger" for side in sides],
         }
+
+
+class TowardSettings(Settings):
+    """Hands that take the tip straight to the target: the nearer, the slower, and never past it."""
+
+    person = False
+
+    gain_per_s: Annotated[PositiveFloat, Usual(0.1, 10.0)] = 1.5
+    """Speed of the tip per distance from the target, in 1/s, as far as the scheme allows."""
+
+    axes: Axes = ("left.x", "left.y", "right.x", "right.y")
+    """Axes of the input that the scheme uses. The default is the axes of two joysticks."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"axis": self.axes, "button": self.axes}
+
+    def needs(self, machine: Machine) -> Names:
+        return {"signal": ["target.position.x"]}
 
 
 class RecordedSettings(Settings):

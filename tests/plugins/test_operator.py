@@ -18,7 +18,7 @@ from labcrane.testing import RATE_HZ, InputContract, ch8
 from labcrane_operator import labcrane_inputs, law
 from labcrane_operator.aimer import Aimer
 from labcrane_operator.noise import Noise
-from labcrane_operator.settings import OperatorSettings
+from labcrane_operator.settings import OperatorSettings, TowardSettings
 
 PRACTISED = {"learning_gain": 0.0}
 STEADY = PRACTISED | {
@@ -47,6 +47,13 @@ class TestSimulatedOperator(InputContract):
     def device(self) -> InputDevice:
         offer = {offer.name: offer for offer in labcrane_inputs()}["simulated_operator"]
         return offer.build(OperatorSettings(), ch8())
+
+
+class TestTowardTarget(InputContract):
+    @pytest.fixture
+    def device(self) -> InputDevice:
+        offer = {offer.name: offer for offer in labcrane_inputs()}["toward_target"]
+        return offer.build(TowardSettings(), ch8())
 
 
 class TestSimulatedOperatorOnOtherAxes(InputContract):

@@ -35,6 +35,7 @@ ANY: dict[str, str] = {
     "Criterion.successes": "is asked about where there are fewer trials",
     "Step.seconds": "is asked about by the questions about breaks",
     "LoadedCraneSettings.payload_kg": ITS_DOUBTS,
+    "Assist.share": SHARE,
     "QuestPlus.guess": SHARE,
     "OperatorSettings.lapse_rate": SHARE,
     "ErrorSettings.over_grip": SHARE,

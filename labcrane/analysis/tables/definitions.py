@@ -69,5 +69,21 @@ MEASURES: Mapping[str, tuple[str, str]] = {
     "coordination_lag": ("s", "its lag, positive when the right stick follows"),
     "effort": ("1", "root mean square of the joint commands, as a fraction of full speed"),
     "limit_hits": ("1", "times a joint came to one of its limits"),
+    "assist_share": (
+        "1",
+        "mean share of the assistant in the command, 0 where the operator had taken over; this "
+        "and the next three only in a study with assist",
+    ),
+    "operator_part": (
+        "1",
+        "of the path in joint space that operator and assistant commanded, each weighted with its "
+        "share, the operator's fraction; 1 with assistant_part",
+    ),
+    "assistant_part": ("1", "the assistant's fraction of that path"),
+    "opposition_time": (
+        "s",
+        "time in which operator and assistant asked for opposite joint movements: the scalar "
+        "product of their joint speeds, without shares, is negative",
+    ),
 }
 """Unit and meaning of what is measured here; the trial table's own columns come in addition."""

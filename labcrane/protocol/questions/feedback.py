@@ -9,6 +9,7 @@ from labcrane.core.settings import Within
 from labcrane.core.signals import Signal
 from labcrane.files.yaml import Place
 from labcrane.protocol.components import ComponentSpec
+from labcrane.protocol.protocol import ASSIST
 from labcrane.protocol.questions.question import (
     Doubts,
     asks,
@@ -45,7 +46,12 @@ def _of_feedback(study: Study) -> Doubts:
     for name in protocol.switched:
         if name not in used:
             key = "secondary" if name in protocol.secondary else "feedback"
-            yield (key, name), f"{key} {name!r} is never switched on"
+            at: Place = (key, name)
+            if protocol.assist and name in protocol.assist.levels:
+                if any(track.factor == ASSIST for track in protocol.design.tracks.values()):
+                    continue
+                key, at = "share", (ASSIST, "share", name)
+            yield at, f"{key} {name!r} is never switched on"
 
 
 @asks
@@ -249,7 +255,7 @@ def _facts(study: Study, feedback: Sequence[str]) -> Facts:
     parts = {**study.cues, **study.sounds, **study.secondary}
     told = dict[str, float]()
     for name in feedback:
-        for each in parts[name].settings.reveals():
+        for each in parts[name].settings.reveals() if name in parts else ():
             fact, far = (each.fact, each.far) if isinstance(each, Within) else (each, math.inf)
             told[fact] = max(told.get(fact, 0.0), far)
     return told
