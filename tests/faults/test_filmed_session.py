@@ -3,12 +3,12 @@
 import stat
 from pathlib import Path
 
-import av
 import numpy as np
 import psutil
 import pytest
 from faults.sessions import labcrane, session_process, wait_for
 from needs import needs
+from plugins.test_film import frames_in
 from recording.test_full_disk import in_namespace
 from simple_crane import CRANE
 
@@ -62,12 +62,6 @@ def filming(launcher: object, name: str) -> psutil.Process | None:
 
 def size(path: Path) -> int:
     return path.stat().st_size if path.exists() else 0
-
-
-def frames_in(path: Path) -> list[float]:
-    """Return where the frames of a file are, in seconds, as a demuxer finds them."""
-    with av.open(str(path)) as file:
-        return [float(each.pts * each.time_base) for each in file.demux(0) if each.size]
 
 
 def check_files(folder: Path, name: str, *, files: int) -> None:

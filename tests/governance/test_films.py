@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from faults.sessions import labcrane
-from governance.kept_people import REASON, check_erased, copied, files, store_of
+from governance.kept_people import REASON, check_erased, files, store_of
 from governed import GOVERNED, TODAY, Lab, edit
 
 from labcrane import ProtocolError
@@ -38,11 +38,6 @@ def filmed(lab: Lab) -> dict[str, bytes]:
             made[f"{name}/{file}"] = f"face of {name[1:]} {file}".encode() * 1000
             (lab.places.raw(name) / file).write_bytes(made[f"{name}/{file}"])
     return made
-
-
-@pytest.fixture
-def lab(recorded: Lab, tmp_path: Path) -> Lab:
-    return copied(recorded, tmp_path)
 
 
 def test_films_are_transferred_and_listed_with_their_session(lab: Lab) -> None:

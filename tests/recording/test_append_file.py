@@ -49,18 +49,6 @@ def test_a_block_that_does_not_fit_is_taken_back_whole(tmp_path: Path) -> None:
     assert path.read_bytes() == b"a" * 909 + b"c" * 91
 
 
-def test_writing_goes_on_once_there_is_room_again(tmp_path: Path) -> None:
-    path = tmp_path / "x"
-    file = AppendFile(path)
-    with limited():
-        file.write(b"a" * 999)
-        with pytest.raises(RecordingError):
-            file.write(b"bb")
-    file.write(b"bb")
-    file.close()
-    assert path.read_bytes() == b"a" * 999 + b"bb"
-
-
 def test_a_missing_folder_is_named(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"nowhere.x: No such file.*check that the folder"):
         AppendFile(tmp_path / "nowhere" / "x")
