@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labcrane.analysis.report.sample import counted
 from labcrane.analysis.scoring.indicator import SUBJECTIVE
 from labcrane.analysis.scoring.operator_tests import OperatorTest
 
@@ -35,6 +36,8 @@ FELT = 0.1
 
 WINDOW = 3
 
+TOO_FEW = "too few runs to say"
+
 
 @dataclass(frozen=True, slots=True)
 class Advice:
@@ -55,7 +58,7 @@ def suggest(tests: Sequence[OperatorTest]) -> Advice:
             if not math.isnan(loss):
                 lost[name] = lost.get(name, 0.0) + loss / len(tests)
     worst = max(lost, key=lambda name: lost[name])
-    runs = f"{len(tests)} test{'s' if len(tests) > 1 else ''}"
+    runs = counted(len(tests), "test")
     if lost[worst] <= 0.0:
         return Advice(tests[0].operator, "next", "nothing: all points", f"no loss in {runs}")
     ranked = sorted(lost, key=lambda name: -lost[name])[:3]
@@ -66,20 +69,19 @@ def suggest(tests: Sequence[OperatorTest]) -> Advice:
     )
 
 
-def familiarity(tests: Sequence[OperatorTest], *, across: bool = False) -> Advice:
+def familiarity(tests: Sequence[OperatorTest]) -> Advice:
     """Return whether an operator's times are stable, below the first, and ratings not worse.
 
     Parameters
     ----------
     tests
-        One operator's, in the order in which they were run, of one scenario.
-    across
-        They are of several scenarios, perhaps one of each: times are then shares of each
-        scenario's reference time.
+        One operator's, in the order in which they were run. Of several scenarios, perhaps one of
+        each, times are shares of each scenario's reference time.
     """
-    about = f"environmental familiarity, {_where(tests, across=across)}"
+    across, where = _where(tests)
+    about = f"environmental familiarity, {where}"
     if len(tests) < FEWEST:
-        return Advice(tests[0].operator, about, "too few runs to say", _runs(len(tests)))
+        return Advice(tests[0].operator, about, TOO_FEW, counted(len(tests), "run"))
     unit = "of the reference" if across else "s"
     times = [test.performance.duration_s / (test.reference_s if across else 1.0) for test in tests]
     last = np.array(times[-WINDOW:])
@@ -97,21 +99,18 @@ def familiarity(tests: Sequence[OperatorTest], *, across: bool = False) -> Advic
     return Advice(tests[0].operator, about, verdict, evidence)
 
 
-def fatigue(tests: Sequence[OperatorTest], *, across: bool = False) -> Advice:
+def fatigue(tests: Sequence[OperatorTest]) -> Advice:
     """Return whether there is scenario fatigue: runs became worse again after the best ones.
 
-    They are compared by the indicator, which includes ratings, and times relative to the reference.
-
-    Parameters
-    ----------
-    tests, across
-        As for :func:`familiarity`.
+    They are compared by the indicator, which includes ratings, and times relative to the reference;
+    ``tests`` are as for :func:`familiarity`.
     """
-    about = f"scenario fatigue, {_where(tests, across=across)}"
+    across, where = _where(tests)
+    about = f"scenario fatigue, {where}"
     percent = np.array([test.indicator.percent for test in tests])
     percent = percent[~np.isnan(percent)]
     if len(percent) < FEWEST:
-        return Advice(tests[0].operator, about, "too few runs to say", _runs(len(percent)))
+        return Advice(tests[0].operator, about, TOO_FEW, counted(len(percent), "run"))
     means = np.convolve(percent, np.ones(WINDOW) / WINDOW, mode="valid")
     best, last = float(means.max()), float(means[-1])
     tired = best - last >= FALL
@@ -121,8 +120,10 @@ def fatigue(tests: Sequence[OperatorTest], *, across: bool = False) -> Advice:
     return Advice(tests[0].operator, about, verdict, evidence)
 
 
-def _where(tests: Sequence[OperatorTest], *, across: bool) -> str:
-    return "all scenarios" if across else tests[0].scenario
+def _where(tests: Sequence[OperatorTest]) -> tuple[bool, str]:
+    """Return whether tests are of several scenarios, and which, in words."""
+    across = len({test.scenario for test in tests}) > 1
+    return across, "all scenarios" if across else tests[0].scenario
 
 
 def _felt(tests: Sequence[OperatorTest]) -> dict[str, tuple[float, float]]:
@@ -149,7 +150,3 @@ def _ratings(tests: Sequence[OperatorTest]) -> str:
         else f"no {name} was rated"
         for name, given in _given(tests).items()
     )
-
-
-def _runs(number: int) -> str:
-    return "1 run" if number == 1 else f"{number} runs"

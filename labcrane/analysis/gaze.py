@@ -38,6 +38,10 @@ ROUNDING_S = 1e-9
 """Samples that hold for as long as a look lasts make one."""
 
 
+Pieces = Sequence[tuple[float, float]]
+"""From when to when, in s: a time without the pauses in it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Looks:
     """The area that was looked at, sample by sample.
@@ -62,39 +66,39 @@ class Looks:
     areas: Sequence[str]
     eyes: str = ""
 
-    def dwell(self, area: str, start: float, stop: float) -> float:
-        """Return for how long ``area`` was looked at from ``start`` to ``stop``, in seconds.
+    def dwell(self, area: str, pieces: Pieces) -> float:
+        """Return for how long ``area`` was looked at in pieces of time, in seconds.
 
         A sample holds until the next one, at most for twice the usual step: a gap is not a look.
         NaN where no sample has a gaze position.
         """
-        held = self._held(start, stop)
+        held = self._held(pieces)
         if not held[self.tracked].any():
             return math.nan
         return float(held[self._on(area)].sum())
 
-    def valid(self, start: float, stop: float) -> float:
-        """Return the share of the time from ``start`` to ``stop`` with known gaze, 0 to 1.
+    def valid(self, pieces: Pieces) -> float:
+        """Return the share of time with known gaze, 0 to 1; NaN if no time passed."""
+        known = float(self._held(pieces)[self.tracked].sum())
+        lasts = sum(max(stop - start, 0.0) for start, stop in pieces)
+        return min(known / lasts, 1.0) if lasts else math.nan
 
-        NaN where there is no time.
-        """
-        known = float(self._held(start, stop)[self.tracked].sum())
-        return min(known / (stop - start), 1.0) if stop > start else math.nan
-
-    def _held(self, start: float, stop: float) -> FloatArray:
-        """Return for how long each sample holds between two times, in s, shape ``(n,)``."""
+    def _held(self, pieces: Pieces) -> FloatArray:
+        """Return for how long each sample holds in pieces of time, in s, shape ``(n,)``."""
         steps = np.diff(self.time, append=np.nan)
         usual = self._usual
         until = self.time + np.where(np.isnan(steps), usual, np.minimum(steps, 2.0 * usual))
-        held: FloatArray = np.minimum(until, stop) - np.maximum(self.time, start)
-        return np.clip(held, 0.0, None)
+        held = np.zeros(len(self.time))
+        for start, stop in pieces:
+            held += np.clip(np.minimum(until, stop) - np.maximum(self.time, start), 0.0, None)
+        return held
 
     def first(self, area: str, start: float, stop: float, least_s: float = 0.0) -> float:
         """Return when ``area`` was first looked at from ``start`` to ``stop``; NaN for never.
 
         A look lasts for ``least_s`` without a sample elsewhere, lost or missing.
         """
-        held = self._held(start, stop)
+        held = self._held([(start, stop)])
         on = self._on(area) & (held > 0.0)
         going_on = np.concatenate([[False], on[:-1] & (np.diff(self.time) <= 2.0 * self._usual)])
         begins = np.flatnonzero(on & ~going_on)
@@ -455,16 +459,12 @@ def gaze_measures(
         "before": _between(pauses, started, onset),
         "during": _between(pauses, onset, offset),
     }
-    found = {f"gaze_valid_{part}": _valid(seen, pieces) for part, pieces in parts.items()}
+    found = {f"gaze_valid_{part}": seen.valid(pieces) for part, pieces in parts.items()}
     for area in seen.areas:
         for part, pieces in parts.items():
-            found[f"dwell_{part}_{area}"] = _dwell(seen, area, pieces)
+            found[f"dwell_{part}_{area}"] = seen.dwell(area, pieces)
         found[f"look_lead_{area}"] = _lead(seen, area, parts["before"], look_least_s)
     return found
-
-
-Pieces = Sequence[tuple[float, float]]
-"""From when to when, in s: a time without the pauses in it."""
 
 
 def _between(pauses: Pieces, start: float, stop: float) -> Pieces:
@@ -472,19 +472,6 @@ def _between(pauses: Pieces, start: float, stop: float) -> Pieces:
     begins = [start, *(until for _, until in within)]
     ends = [*(since for since, _ in within), stop]
     return [(max(begin, start), end) for begin, end in zip(begins, ends, strict=True)]
-
-
-def _valid(seen: Looks, pieces: Pieces) -> float:
-    lasts = [max(end - begin, 0.0) for begin, end in pieces]
-    known = [
-        seen.valid(*piece) * length for piece, length in zip(pieces, lasts, strict=True) if length
-    ]
-    return sum(known) / sum(lasts) if known else math.nan
-
-
-def _dwell(seen: Looks, area: str, pieces: Pieces) -> float:
-    known = [dwell for piece in pieces if not math.isnan(dwell := seen.dwell(area, *piece))]
-    return sum(known) if known else math.nan
 
 
 def _lead(seen: Looks, area: str, pieces: Pieces, least_s: float) -> float:

@@ -106,10 +106,6 @@ class MeasureSettings:
         if self.gaze_eye not in EYES:
             raise ValueError(f"there is no gaze_eye {self.gaze_eye!r}; there is {', '.join(EYES)}")
 
-    def as_dict(self) -> dict[str, object]:
-        """Return the settings by name, ready for JSON."""
-        return asdict(self)
-
 
 DEFAULTS = MeasureSettings()
 
@@ -121,7 +117,7 @@ def measures_of(participant: Participant, settings: MeasureSettings = DEFAULTS) 
     """
     if participant.measured is not None:
         return participant.measured
-    about = {"measures": settings.as_dict()}
+    about = {"measures": asdict(settings)}
     table = kept(participant.path, about, lambda: _all_sessions(participant, settings))
     table.insert(0, "participant", participant.name)
     table.insert(1, "status", str(participant.status))

@@ -504,12 +504,12 @@ def test_one_test_of_each_scenario_tells_familiarity_and_fatigue_of_all_together
     assert said["environmental familiarity, all scenarios"] == "familiar"
     assert said["scenario fatigue, all scenarios"] == "none"
     unsure = visit([1.5, 1.2, 1.02, 1.0, 1.01, 1.0], [0.9, 0.9, 0.8, 0.6, 0.5, 0.5])
-    found = familiarity(unsure, across=True)
+    found = familiarity(unsure)
     assert found.verdict == "still learning: felt accuracy has fallen"
     assert "1.00, 1.01, 1.00 of the reference spread 1 %, the first was 1.50" in found.evidence
     assert "rated accuracy went from 0.90 to 0.50, rated awareness went" in found.evidence
     tired = visit([1.0, 1.0, 1.0, 1.6, 1.7, 1.8], [0.9, 0.9, 0.9, 0.5, 0.4, 0.4])
-    found = fatigue(tired, across=True)
+    found = fatigue(tired)
     assert found.verdict == "fatigue: give other scenarios, or a break"
     (one,) = {each.operator for each in advice(tired)}
     assert one == "R001"

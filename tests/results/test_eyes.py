@@ -181,5 +181,5 @@ def test_an_area_that_the_tracker_is_not_sure_of_is_not_looked_at(seed: int) -> 
     tracked = random.random(len(time)) < 0.5
     found = Looks(time, area, tracked, ["target", "crane"])
     known = [at for at, name in enumerate(area) if name == "target" and tracked[at]]
-    assert found.dwell("target", 0.0, 3.0) == pytest.approx(0.01 * len(known))
+    assert found.dwell("target", [(0.0, 3.0)]) == pytest.approx(0.01 * len(known))
     assert found.first("target", 0.0, 3.0) == pytest.approx(time[known[0]])

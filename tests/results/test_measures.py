@@ -107,7 +107,7 @@ def test_a_sample_alone_is_no_first_look_and_neither_are_two_beside_a_gap() -> N
 
 def test_a_gap_in_the_eyes_is_no_look() -> None:
     seen = Looks(np.array([0.0, 0.1, 0.2, 5.0, 5.1]), ["a"] * 5, np.ones(5, bool), ["a"])
-    assert seen.dwell("a", 0.0, 10.0) == pytest.approx(0.1 + 0.1 + 0.2 + 0.1 + 0.1)
+    assert seen.dwell("a", [(0.0, 10.0)]) == pytest.approx(0.1 + 0.1 + 0.2 + 0.1 + 0.1)
     assert math.isnan(seen.first("b", 0.0, 10.0))
 
 

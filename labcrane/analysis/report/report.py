@@ -1,6 +1,7 @@
 """The report of a study: one page, one page per participant, figures and tables."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -134,7 +135,7 @@ def write_report(
         page.say(f"Used on request, though timestamp accuracy is unknown: {'; '.join(unprobed)}.")
     page.lead(answer(cohort, everything, (tables["loop"], tables["sync"]), about, results))
     page.heading("Definitions")
-    words = "; ".join(f"{name} {_setting(value)}" for name, value in settings.as_dict().items())
+    words = "; ".join(f"{name} {_setting(value)}" for name, value in asdict(settings).items())
     page.say(f"Settings of the measures: {words}.")
     page.say(
         "A movement begins when the tip is first faster than onset_speed for onset_hold, columns "

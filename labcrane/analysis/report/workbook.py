@@ -1,7 +1,7 @@
 """The evaluation workbook: tests, operators, trend and advice, totals as values and as formulas."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 from statistics import fmean
@@ -18,23 +18,9 @@ if TYPE_CHECKING:
 Cell = str | int | float | None
 
 COMPONENTS = (*OBJECTIVE, *SUBJECTIVE)
-FACTS = ("operator", "session", "trial", "scenario", "duration_s", "reference_s")
-COUNTS = ("object", "body", "overload_max", "overload_min", "accuracy", "awareness")
-HEAD = (
-    *FACTS,
-    *(f"n_{name}" if name in OBJECTIVE else f"s_{name}" for name in COUNTS),
-    "n_drop",
-    *DETECTION,
-    "k",
-    "k because",
-    *(f"points {name}" for name in COMPONENTS),
-    *(f"weight {name}" for name in COMPONENTS),
-    "objective",
-    "subjective",
-    "raw",
-    "percent",
-    *(f"{name} (formula)" for name in ("objective", "subjective", "raw", "percent")),
-)
+TOTALS = ("objective", "subjective", "raw", "percent")
+"""Columns that follow from others: written as values, and again as formulas."""
+
 SUMMARY = (
     "operator",
     "tests",
@@ -69,13 +55,18 @@ def write_workbook(tests: Sequence[OperatorTest], path: Path, kinds: str = "") -
     if summary is None:
         raise AssertionError("a new workbook has a sheet")
     summary.title = "Summary"
+    head = [*_values(tests[0]), *(f"{name} (formula)" for name in TOTALS)]
+    at = {name: _letters(column) for column, name in enumerate(head, start=1)}
     first = _begin(summary, SUMMARY, kinds)
-    _fill(summary, _operators(tests, first))
+    _fill(summary, _operators(tests, first, at))
     sheet = book.create_sheet("Tests")
-    first = _begin(sheet, HEAD, kinds)
-    _fill(sheet, map(_row, tests, range(first, first + len(tests))))
-    _trend(book, tests, kinds)
-    for title, head, rows in (
+    first = _begin(sheet, head, kinds)
+    _fill(
+        sheet,
+        ([*_values(test).values(), *_formulas(at, row)] for row, test in enumerate(tests, first)),
+    )
+    _trend(book, tests, kinds, at)
+    for title, columns, rows in (
         ("Deformities", ("operator", *KINDS), _detections(tests)),
         (
             "Advice",
@@ -85,7 +76,7 @@ def write_workbook(tests: Sequence[OperatorTest], path: Path, kinds: str = "") -
         ("Settings", ("operator", "session", "setting", "value"), _used(tests)),
     ):
         sheet = book.create_sheet(title)
-        _begin(sheet, head, kinds)
+        _begin(sheet, columns, kinds)
         _fill(sheet, rows)
     book.save(path)
 
@@ -94,12 +85,11 @@ def write_csv(tests: Sequence[OperatorTest], path: Path) -> None:
     """Write the sheet ``Tests`` as CSV: its values, without the formulas."""
     import csv
 
-    columns = [at for at, name in enumerate(HEAD) if not name.endswith("(formula)")]
-    rows = [_row(test, number) for number, test in enumerate(tests, start=2)]
+    rows = [_values(test) for test in tests]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow([HEAD[at] for at in columns])
-        writer.writerows([_safe(row[at]) for at in columns] for row in rows)
+        writer.writerow(rows[0])
+        writer.writerows(map(_safe, row.values()) for row in rows)
 
 
 def advice(tests: Sequence[OperatorTest]) -> Iterator[Advice]:
@@ -107,49 +97,47 @@ def advice(tests: Sequence[OperatorTest]) -> Iterator[Advice]:
     for _, own in groupby(tests, key=lambda test: test.operator):
         mine = list(own)
         yield suggest(mine)
-        scenarios = dict.fromkeys(test.scenario for test in mine)
-        for scenario in scenarios:
-            runs = [test for test in mine if test.scenario == scenario]
+        names = dict.fromkeys(test.scenario for test in mine)
+        of_each = [[test for test in mine if test.scenario == name] for name in names]
+        several = [mine] if len(names) > 1 else []  # perhaps with one test of each
+        for runs in (*of_each, *several):
             yield familiarity(runs)
             yield fatigue(runs)
-        if len(scenarios) > 1:  # perhaps with one test of each
-            yield familiarity(mine, across=True)
-            yield fatigue(mine, across=True)
 
 
-def _row(test: OperatorTest, number: int) -> tuple[Cell, ...]:
+def _values(test: OperatorTest) -> dict[str, Cell]:
+    """Return the values of a test by their columns."""
     performance, indicator = test.performance, test.indicator
-    points = [_number(indicator.points.get(name)) for name in COMPONENTS]
-    weights = [indicator.largest.get(name) for name in COMPONENTS]
-    at = {name: _letters(HEAD.index(name) + 1) + str(number) for name in HEAD}
-    k, raw = at["k"], at["raw (formula)"]
-    objective = f"=SUM({at['points duration']}:{at['points overload_min']})"
-    subjective = f"={at['points accuracy']}+{at['points awareness']}"
+    return {
+        **{name: getattr(test, name) for name in ("operator", "session", "trial", "scenario")},
+        "duration_s": performance.duration_s,
+        "reference_s": test.reference_s,
+        **{f"n_{name}": getattr(performance, name) for name in OBJECTIVE[1:]},
+        **{f"s_{name}": _number(getattr(performance, name)) for name in SUBJECTIVE},
+        "n_drop": performance.drop,
+        **{name: _known(getattr(test.detection, name)) for name in DETECTION},
+        "k": int(indicator.completed),
+        "k because": test.why,
+        **{f"points {name}": _number(indicator.points.get(name)) for name in COMPONENTS},
+        **{f"weight {name}": indicator.largest.get(name) for name in COMPONENTS},
+        **{name: _number(getattr(indicator, name)) for name in TOTALS},
+    }
+
+
+def _formulas(at: Mapping[str, str], row: int) -> tuple[Cell, ...]:
+    """Return the formulas of :data:`TOTALS` in a row, from the letters of columns."""
+    cell = {name: f"{letters}{row}" for name, letters in at.items()}
     return (
-        test.operator,
-        test.session,
-        test.trial,
-        test.scenario,
-        performance.duration_s,
-        test.reference_s,
-        *(_number(getattr(performance, name)) for name in COUNTS),
-        performance.drop,
-        *(_known(getattr(test.detection, name)) for name in DETECTION),
-        int(indicator.completed),
-        test.why,
-        *points,
-        *weights,
-        *map(
-            _number, (indicator.objective, indicator.subjective, indicator.raw, indicator.percent)
-        ),
-        objective,
-        subjective,
-        f"={k}*({at['objective (formula)']}+{at['subjective (formula)']})",
-        f"=100*{raw}/SUM({at['weight duration']}:{at['weight awareness']})",
+        f"=SUM({cell['points duration']}:{cell['points overload_min']})",
+        f"={cell['points accuracy']}+{cell['points awareness']}",
+        f"={cell['k']}*({cell['objective (formula)']}+{cell['subjective (formula)']})",
+        f"=100*{cell['raw (formula)']}/SUM({cell['weight duration']}:{cell['weight awareness']})",
     )
 
 
-def _operators(tests: Sequence[OperatorTest], first: int) -> Iterator[tuple[Cell, ...]]:
+def _operators(
+    tests: Sequence[OperatorTest], first: int, at: Mapping[str, str]
+) -> Iterator[tuple[Cell, ...]]:
     names = dict.fromkeys(test.operator for test in tests)
     for row, operator in enumerate(names, start=first):
         own = [test for test in tests if test.operator == operator]
@@ -159,12 +147,14 @@ def _operators(tests: Sequence[OperatorTest], first: int) -> Iterator[tuple[Cell
             _number(fmean(test.indicator.raw for test in own)),
             _number(fmean(test.indicator.percent for test in own)),
             suggest(own).verdict,
-            f"=AVERAGEIFS({_column('raw (formula)')},{_column('operator')},A{row})",
-            f"=AVERAGEIFS({_column('percent (formula)')},{_column('operator')},A{row})",
+            f"=AVERAGEIFS({_column(at, 'raw (formula)')},{_column(at, 'operator')},A{row})",
+            f"=AVERAGEIFS({_column(at, 'percent (formula)')},{_column(at, 'operator')},A{row})",
         )
 
 
-def _trend(book: "Workbook", tests: Sequence[OperatorTest], kinds: str) -> None:
+def _trend(
+    book: "Workbook", tests: Sequence[OperatorTest], kinds: str, at: Mapping[str, str]
+) -> None:
     from openpyxl.chart import LineChart, Reference
 
     sheet = book.create_sheet("Trend")
@@ -184,14 +174,14 @@ def _trend(book: "Workbook", tests: Sequence[OperatorTest], kinds: str) -> None:
         if (operator, sessions[row - first]) not in percents:
             return None
         name = f"{_letters(column)}${first - 1}"
-        by = f"{_column('operator')},{name},{_column('session')},$A{row}"
-        return f"=AVERAGEIFS({_column('percent (formula)')},{by})"
+        by = f"{_column(at, 'operator')},{name},{_column(at, 'session')},$A{row}"
+        return f"=AVERAGEIFS({_column(at, 'percent (formula)')},{by})"
 
     rows = (
         (
             session,
             *(mean(name, session) for name in operators),
-            *(formula(name, at, row) for at, name in enumerate(operators, start=2)),
+            *(formula(name, column, row) for column, name in enumerate(operators, start=2)),
         )
         for row, session in enumerate(sessions, start=first)
     )
@@ -269,9 +259,8 @@ def _number(value: float | None) -> Cell:
     return NO_RATING if value is not None and math.isnan(value) else value
 
 
-def _column(name: str) -> str:
-    letters = _letters(HEAD.index(name) + 1)
-    return f"Tests!${letters}:${letters}"
+def _column(at: Mapping[str, str], name: str) -> str:
+    return f"Tests!${at[name]}:${at[name]}"
 
 
 def _letters(column: int) -> str:
