@@ -89,14 +89,7 @@ def in_window(gaze: Stream) -> bool:
 class WindowGaze:
     """Where in the window eyes look, by a stream in its pixels.
 
-    Attributes
-    ----------
-    stream
-        The gaze stream.
-    eyes
-        Those that are used.
-    least
-        Confidence below which a sample is not gaze.
+    A sample below the confidence ``least`` is not gaze.
     """
 
     stream: Stream

@@ -36,12 +36,14 @@ def unlike_protocols(cohort: Cohort) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    versions: dict[str, Leaves] = {}
-    runs: list[tuple[str, str]] = []  # of each session: its name, and the version that it has
+    versions: dict[tuple[object, ...], Leaves] = {}
+    runs: list[
+        tuple[str, tuple[object, ...]]
+    ] = []  # of each session: its name, and the version that it has
     several = any(len(person.usable) > 1 for person in cohort.included)
     for person in cohort.included:
         for number, session in person.sessions():
-            version = _digest(session.context)
+            version = _key(session.context)
             if version not in versions:
                 versions[version] = _leaves_of(session.context)
             runs.append((f"{person.name} session {number}" if several else person.name, version))
@@ -73,14 +75,9 @@ def in_words(unlike: "pd.DataFrame") -> str:
     )
 
 
-def _digest(context: Mapping[str, Any]) -> str:
-    parts = (
-        context.get("protocol", ""),
-        context.get("machine", ""),
-        *(f"{name} {digest}" for name, digest in _files(context)),
-        _version(context),
-    )
-    return sha256("\0".join(map(str, parts)).encode()).hexdigest()
+def _key(context: Mapping[str, Any]) -> tuple[object, ...]:
+    """Return all that :func:`_leaves_of` follows from, not yet parsed."""
+    return context.get("protocol"), context.get("machine"), *_files(context), _version(context)
 
 
 def _leaves_of(context: Mapping[str, Any]) -> Leaves:
