@@ -17,6 +17,7 @@ def methods(lock: Lock) -> str:
         f"Participants operated the {lock.content['machine_title']} "
         f"({_use(protocol['dynamics'])}) with the input {_use(protocol['input'])} under the "
         f"scheme {_use(protocol['scheme'])}",
+        *_assistant(protocol),
         f"The simulation ran at {_number(protocol.get('rate_hz', 240))} Hz, and every tick was "
         "recorded",
         *_parts(protocol, lock.content.get("settings", {})),
@@ -52,11 +53,25 @@ def _amended(lock: Lock) -> str:
     return f" and amended: {listed}"
 
 
+def _assistant(protocol: Mapping[str, Any]) -> list[str]:
+    if not (assist := protocol.get("assist")):
+        return []
+    share = assist["share"]
+    words = "a share" if isinstance(share, Mapping) else f"a share of {_value(share)}"
+    said = f"An assistant ({_use(assist)}) moved the machine together with them: the command of "
+    said += f"each joint was a weighted mean of both, with {words} of the assistant"
+    if takeover := assist.get("takeover"):
+        said += f", and the participant's alone while {takeover} was pressed"
+    return [said]
+
+
 def _people(protocol: Mapping[str, Any]) -> list[str]:
     planned = protocol.get("participants", {}).get("planned", 1)
     said = [f"It was planned with {planned} participant{'s' * (planned != 1)}, under pseudonyms"]
     if groups := protocol.get("design", {}).get("groups"):
-        listed = "; ".join(f"{name} {_given(list(given))}" for name, given in groups.items())
+        listed = "; ".join(
+            f"{name} {_given(list(given), protocol)}" for name, given in groups.items()
+        )
         said.append(
             f"They were allocated to {len(groups)} groups ({listed}) in permuted blocks of "
             f"{len(groups)}"
@@ -117,7 +132,9 @@ def _design(protocol: Mapping[str, Any]) -> list[str]:
     design = protocol.get("design", {})
     conditions, orders = design.get("conditions", {}), design.get("order", {})
     if conditions:
-        listed = "; ".join(f"{name} {_given(given)}" for name, given in conditions.items())
+        listed = "; ".join(
+            f"{name} {_given(given, protocol)}" for name, given in conditions.items()
+        )
         said.append(f"Every participant had {len(conditions)} conditions ({listed})")
         orders = {"condition": "as_written", **orders}
     for factor, order in orders.items():
@@ -133,13 +150,29 @@ def _design(protocol: Mapping[str, Any]) -> list[str]:
     return said
 
 
-def _given(feedback: str | list[str]) -> str:
-    """Return a condition's feedback in words: ``with the feedback ball and tone``."""
-    if feedback in ("none", []):
-        return "without feedback"
-    if feedback in ("all", "group"):
-        return "with all feedback" if feedback == "all" else "with the feedback of the group"
-    return f"with the feedback {_value(feedback)}"
+def _given(given: str | list[str], protocol: Mapping[str, Any]) -> str:
+    """Return what is on in words: ``with the feedback ball and an assistant's share of 0.5``."""
+    shares = _shares(protocol)
+    if given == "group":
+        return "with the feedback of the group"
+    if given == "all":
+        given = [*protocol.get("feedback", {}), *shares]
+        if not shares:
+            return "with all feedback"
+    names = [] if given == "none" else list(given)
+    cues = [name for name in names if name not in shares]
+    words = [f"with the feedback {_value(cues)}" if cues else "without feedback"]
+    if shares:
+        size = next((shares[name] for name in names if name in shares), 0.0)
+        helped = f"with an assistant's share of {_value(size)}" if size else "without assistance"
+        words = [*words, helped] if protocol.get("feedback") else [helped]
+    return " and ".join(words)
+
+
+def _shares(protocol: Mapping[str, Any]) -> Mapping[str, float]:
+    """Return the shares of an assistant that have names."""
+    share = protocol.get("assist", {}).get("share")
+    return share if isinstance(share, Mapping) else {}
 
 
 def _sessions(protocol: Mapping[str, Any]) -> list[str]:
@@ -148,13 +181,13 @@ def _sessions(protocol: Mapping[str, Any]) -> list[str]:
         words = f"Session {number} ({session['name']})"
         if days := session.get("after_days"):
             words += f", {days[0]} to {days[1]} days after the one before,"
-        steps = [_step(step, feedback=bool(protocol.get("feedback"))) for step in session["steps"]]
+        steps = [_step(step, protocol) for step in session["steps"]]
         said.append(f"{words} consisted of {_and(steps)}")
     return said
 
 
-def _step(step: str | Mapping[str, Any], *, feedback: bool) -> str:
-    """Return a step; one of trials with its feedback, in a study that has any."""
+def _step(step: str | Mapping[str, Any], protocol: Mapping[str, Any]) -> str:
+    """Return a step; one of trials with what is on, in a study that has feedback or shares."""
     if isinstance(step, str):
         return step
     ((kind, value),) = step.items()
@@ -170,8 +203,8 @@ def _step(step: str | Mapping[str, Any], *, feedback: bool) -> str:
     times = value.get("repeat", 1)
     if place := value.get("condition"):
         name = f"{name} (the participant's condition {place})"
-    elif feedback and task:
-        name = f"{name} {_given(value.get('feedback', 'all'))}"
+    elif task and (protocol.get("feedback") or _shares(protocol)):
+        name = f"{name} {_given(value.get('feedback', 'all'), protocol)}"
         if shares := value.get("fading"):
             name = f"{name} in shares of {_value(shares)} of the trials of successive parts"
     label = f"the {kind} {name}" if name else f"{kind} ({_listed(value)})"

@@ -118,6 +118,23 @@ def test_the_steps_of_a_session_are_words_with_units_in_the_methods(tmp_path: Pa
     ) in said
 
 
+def test_the_methods_name_the_assistant_and_its_share_in_each_condition(tmp_path: Path) -> None:
+    shares = "assist: {use: toward_target, takeover: right.trigger, share: {half: 0.5, full: 1}}"
+    given = "conditions: {alone: none, shared: [half, tone], automatic: [full]}"
+    text = GROUPED.replace("tasks:", f"{shares}\ntasks:").replace("design:", f"design:\n  {given}")
+    text = text.replace("{task: aiming", "{task: aiming, condition: 1", 1)
+    said = methods(Lab(tmp_path, text).approve())
+    for words in (
+        "An assistant (toward target) moved the machine together with them: the command of each "
+        "joint was a weighted mean of both, with a share of the assistant, and the participant's "
+        "alone while right.trigger was pressed. ",
+        "3 conditions (alone without feedback and without assistance; shared with the feedback "
+        "tone and with an assistant's share of 0.5; automatic without feedback and with an "
+        "assistant's share of 1). ",
+    ):
+        assert words in said
+
+
 TRAINED = GROUPED.replace("design:", "design:\n  primary: [movement_time, absolute_error]").replace(
     "  - name: only",
     "  - name: before\n    steps:\n"
