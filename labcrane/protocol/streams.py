@@ -72,7 +72,8 @@ class StreamNeed(Settings):
     """When samples of a regular stream get their timestamps, if its maker states that. With
     ``at_sampling`` they are the samples' own times: a step to later is a pause of the sampler, and
     what scatters are the samples. With ``when_sent`` each is late by a wait that changes. Without
-    it, the uncertainty includes what either leaves open."""
+    it, the uncertainty includes what either leaves open. A wrong declaration makes it too small,
+    where the timestamps do not contradict it."""
 
     sees: dict[str, str] = Field(default_factory=dict)
     """Channels of a photodiode, a microphone or an accelerometer, by label, each with the view,

@@ -66,7 +66,8 @@ def conclude(group: "h5py.Group", spaces: Mapping[str, str] = NO_SPACES) -> Sync
     """
     context = json.loads(text_of(group["context"]))
     needs = {
-        label: StreamNeed.model_validate(need) for label, need in context.get("streams", {}).items()
+        label: StreamNeed.model_validate(_as_now(need))
+        for label, need in context.get("streams", {}).items()
     }
     limits = TimeLimits.model_validate(context.get("sync", {})).limits()
     streams = [_read(one, needs) for one in group.get("streams", {}).values()]
@@ -94,6 +95,14 @@ def conclude(group: "h5py.Group", spaces: Mapping[str, str] = NO_SPACES) -> Sync
     )
     write_sync_report(group, report.as_json())
     return report
+
+
+def _as_now(need: dict[str, Any]) -> dict[str, Any]:
+    """Return a stream's entry with ``stamped`` for ``pauses``, which recordings of before have."""
+    now = dict(need)
+    if now.pop("pauses", False):
+        now["stamped"] = "at_sampling"
+    return now
 
 
 def _read(group: "h5py.Group", needs: dict[str, StreamNeed]) -> _Read:

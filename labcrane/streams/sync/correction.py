@@ -271,9 +271,8 @@ def _correct(raw: RawStream, treatment: Treatment, end: float | None) -> Correct
     shift = treatment.transport_s + treatment.latency_s
     quality = _summed(raw, placed, sampled, (time, terms, end), regular=regular)
     if regular and treatment.stamped:
-        at_sampling = treatment.stamped is Stamped.AT_SAMPLING
-        against = at_sampling and any(one.computed for _, one, _ in sampled)
-        quality = replace(quality, stamped=treatment.stamped.value, contradicted=int(against))
+        against = next((one.contradicted for _, one, _ in sampled if one.contradicted), "")
+        quality = replace(quality, stamped=treatment.stamped.value, contradicted=against)
     return Corrected(time - shift, terms, placed.time - shift, placed.segments, quality)
 
 
@@ -296,11 +295,13 @@ def _examined(raw: RawStream, placed: Placement, treatment: Treatment) -> list[_
             )
             probed = segment.basis is Basis.PROBES
             if regular:
-                sampling = examine(*seen, probed=probed, late=stamped is Stamped.WHEN_SENT)
+                late = stamped is Stamped.WHEN_SENT
+                period = 1.0 / treatment.rate_hz
+                sampling = examine(*seen, probed=probed, late=late, nominal_s=period)
             else:
                 sampling = examine_irregular(*seen)
             if stamped is Stamped.AT_SAMPLING:
-                sampling = sampling.as_sampled()
+                sampling = sampling.as_sampled(raw.stamps[part])
             followed = None
             if sampling.steady:
                 followed = _followed(times[part], sampling)

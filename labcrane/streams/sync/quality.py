@@ -92,7 +92,8 @@ class Quality:
     late_stamps
         1 where chunks are stamped when they are sent.
     stamped, contradicted
-        When samples are stamped, as far as that is declared; 1 where stamps contradict it.
+        When samples are stamped, as far as that is declared; what stamps are by themselves where
+        they contradict it.
     shifts, shift_s
         How often stamps are later, or sooner, from one sample on, by the largest shift.
     strayed
@@ -151,7 +152,7 @@ class Quality:
     grid_s: float = 0.0
     late_stamps: int = 0
     stamped: str = ""
-    contradicted: int = 0
+    contradicted: str = ""
     shifts: int = 0
     shift_s: float = 0.0
     strayed: int = 0

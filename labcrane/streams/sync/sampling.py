@@ -97,6 +97,8 @@ class Sampling:
         Whether stamps scatter by so much that single lost samples cannot be counted.
     computed
         Whether stamps within chunks are computed, or closer than samples can be.
+    contradicted
+        What stamps are by themselves that are declared to be the samples' own times.
     unplaced
         Whether samples may be missing among those stamped late, and nothing tells where.
     received
@@ -149,6 +151,7 @@ class Sampling:
     steady: bool = False
     uncounted: bool = False
     computed: bool = False
+    contradicted: str = ""
     unplaced: bool = False
     received: receipt.Receipt | None = None
     shifted: shifts.Shifts | None = None
@@ -172,22 +175,29 @@ class Sampling:
         """Samples per second, while they flowed."""
         return 1.0 / self.period
 
-    def as_sampled(self) -> "Sampling":
+    def as_sampled(self, stamps: FloatArray) -> "Sampling":
         """Return it with stamps that are declared to be the samples' own times.
 
         A step to later is a pause then, and what scatters are the samples. Of a step back, one of
-        both sides is wrong all the same. Computed stamps contradict the declaration.
+        both sides is wrong all the same. Where stamps contradict the declaration, it is not used.
+        Stamps of a coarse clock keep what it leaves open.
         """
+        paused = None if self.shifted is None else self.shifted.without_pauses()
+        if (np.diff(stamps) == 0.0).any():
+            return replace(self, contradicted="the same for several samples")
+        if units.find(stamps):
+            return replace(self, shifted=paused, wander_s=0.0)
         if self.computed:
-            return self
+            return replace(self, contradicted="computed within chunks")
+        if self.received is not None:
+            return replace(self, contradicted="late by waits, by how they scatter")
         return replace(
             self,
             noise_s=0.0,
             late_stamps=False,
             steady=False,
             unplaced=False,
-            received=None,
-            shifted=None if self.shifted is None else self.shifted.without_pauses(),
+            shifted=paused,
             uneven_s=0.0,
             unsure_s=0.0,
             slip_s=0.0,
@@ -232,6 +242,7 @@ def examine(
     *,
     probed: bool = True,
     late: bool = False,
+    nominal_s: float = 0.0,
 ) -> Sampling:
     """Examine one clock's samples of a regular stream.
 
@@ -249,11 +260,14 @@ def examine(
         Whether times rest on probes; those by arrivals scatter for another reason.
     late
         Whether stamps are declared to be late by waits that change.
+    nominal_s
+        The nominal period, which few samples do not show.
     """
     index = np.arange(len(time), dtype=np.float64) if counter is None else counter
     stalls, longest = _stalls(time, arrival)
     if len(time) < FEW:
-        return Sampling(index=index, stalls=stalls, longest_stall_s=longest)
+        waits = _few_waits(time, index, nominal_s) if late else 0.0
+        return Sampling(index=index, noise_s=waits, stalls=stalls, longest_stall_s=longest)
     order = np.argsort(time, kind="stable")
     behind = int(np.count_nonzero(np.diff(np.maximum.accumulate(time)) == 0.0))
     sorted_steps = np.diff(time[order])
@@ -609,6 +623,13 @@ def _noise(
         if share + 3.0 * doubt < 1.0 - UNLIKE and share < UNLIKE:
             return spread, False, False, 0.0
     return 0.0, False, False, spread
+
+
+def _few_waits(time: FloatArray, index: FloatArray, period: float) -> float:
+    """Return how far samples may have waited that are too few to show it; NaN of one or two."""
+    if len(time) < FEW_CHUNKS:
+        return np.nan
+    return FEW_CHUNKS * float(np.ptp(time - period * index))
 
 
 def _reach(found: _Steps) -> float:

@@ -48,6 +48,8 @@ def typical(terms: Terms, time: FloatArray) -> tuple[float, dict[str, float]]:
 
 def in_words(uncertainty_s: float, made_of: Mapping[str, float]) -> str:
     """Return an uncertainty and what it is made of, the largest first, down to 1 us."""
+    if np.isnan(uncertainty_s):
+        return "an unknown time"
     largest = sorted(made_of.items(), key=lambda one: -one[1])
     shown = " + ".join(f"{1e3 * size:.3f} {name}" for name, size in largest if size >= LEAST_S)
     return f"{1e3 * uncertainty_s:.3f} ms" + (f" ({shown})" if shown else "")

@@ -116,7 +116,7 @@ def corrections(quality: Quality) -> list[str]:
     if quality.made_of_s:
         done.append(f"uncertain by {in_words(quality.error_p95_s, quality.made_of_s)}")
     if quality.stamped and not quality.contradicted:
-        done.append(f"declared by the study: stamped {quality.stamped.replace('_', ' ')}")
+        done.append(f"declared, not measured: stamped {quality.stamped.replace('_', ' ')}")
     if np.isfinite(quality.drift_ppm):
         done.append(f"mapped from a clock that runs {quality.drift_ppm:+.1f} ppm off")
     for count, what in (

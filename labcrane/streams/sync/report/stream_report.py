@@ -258,8 +258,8 @@ def _scatter(quality: Quality, limits: Limits) -> list[Finding]:
     """Judge how far stamps lie beside an even count."""
     found: list[Finding] = []
     if quality.contradicted:
-        text = "its timestamps are computed within chunks, though it is declared to be stamped at "
-        text += "sampling: the declaration was not used"
+        text = f"its timestamps are {quality.contradicted}, though it is declared to be stamped "
+        text += "at sampling: the declaration was not used"
         _add(found, Verdict.WARN, text, "remove stamped: at_sampling, or stamp each sample")
     if quality.late_stamps:
         text = f"chunks are stamped when they are sent ({1e3 * quality.noise_s:.1f} ms of scatter)"
