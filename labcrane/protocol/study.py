@@ -518,6 +518,13 @@ class Checker:
             for place, block in self._blocks()
             if block.track in tracks and tracks[block.track].factor == ASSIST
         }
+        for place, block in self._blocks():
+            of_condition = (*place, "feedback") in tracked and block.condition is not None
+            given = self._protocol.design.conditions.values() if of_condition else ()
+            if any(on == "all" or (on != "none" and set(on) & set(shares)) for on in given):
+                message = "a track chooses the share of assist here, and conditions switch shares "
+                message += "on as well; remove one of both"
+                self._source.problem((*place, "condition"), message)
         for at, switch in switches.items():
             names = self._protocol.switched if switch == "all" else switch
             on = [name for name in names if name in shares]

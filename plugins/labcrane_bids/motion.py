@@ -63,7 +63,10 @@ def tracking_systems(session: SessionRecord, every: int) -> Iterator[TrackingSys
         sticks.setdefault(column.rpartition(".")[0] or "input", []).append(column)
     for stick, columns in sticks.items():
         name = {"left": "joyL", "right": "joyR"}.get(stick, "".join(filter(str.isalnum, stick)))
-        yield _system(name, f"the operator's {stick} stick", axes, columns, every)
+        whose, which = "the operator's", stick
+        if stick.startswith("assist."):
+            whose, which = "the assistant's", stick.removeprefix("assist.")
+        yield _system(name, f"{whose} {which} stick", axes, columns, every)
 
 
 def _system(

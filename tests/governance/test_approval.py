@@ -144,4 +144,4 @@ def test_an_input_that_needs_nobody_is_refused_for_people_and_runs_as_a_pilot(
 def test_the_inputs_without_a_person_are_known() -> None:
     offers = discover().offers[InputDevice].values()
     alone = {offer.name for offer in offers if not offer.settings.person}
-    assert alone == {"recorded", "scenario_operator", "simulated_operator"}
+    assert alone == {"recorded", "scenario_operator", "simulated_operator", "toward_target"}

@@ -23,6 +23,7 @@ from labcrane.core.findings import Finding, Verdict
 from labcrane.core.records import Event
 from labcrane.doctor.report import Check
 from labcrane.protocol.study import load
+from labcrane.recording.crash_marker import crash_marker_path, read_crash_marker
 from labcrane.recording.journal import Column, SessionJournal
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
@@ -123,6 +124,10 @@ def test_nothing_of_people_is_in_any_byte_of_the_report_of_a_session(here: Path)
     assert set(about["plugins"]) & ours
 
 
+TICKS = 240
+"""A session that is killed has run for a second."""
+
+
 @pytest.fixture(scope="module")
 def killed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A study whose session was killed while it ran."""
@@ -135,6 +140,10 @@ def killed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     second = labcrane(*words, "--session", 2, cwd=folder)
     journal = folder / "data" / f"{PERSON}-SIMULATED" / "ses-02_run.xdf"
     wait_for(lambda: journal.exists() and b'"trial.start"' in journal.read_bytes())
+    # Frames are written a moment after their ticks: both must be in the report.
+    wait_for(
+        lambda: (begun := read_crash_marker(crash_marker_path(journal))) and begun.tick > TICKS
+    )
     kill_all(second)
     second.communicate(timeout=120)
     yield folder

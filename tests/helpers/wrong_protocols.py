@@ -241,7 +241,7 @@ def right(study: str, registry: Registry) -> str:
         for key in entry.keys:
             uses = data.get(key) or {}
             for use in uses.values() if entry.several else [uses]:
-                if isinstance(use, Mapping) and use["use"] in registry.offers[role]:
+                if isinstance(use, Mapping) and use.get("use") in registry.offers[role]:
                     _fill(use, registry.offers[role][use["use"]].settings)
     for key, model in (
         ("participants", Participants),

@@ -210,6 +210,17 @@ WRONG = {
 }
 
 
+def test_a_track_and_conditions_do_not_both_choose_the_share(tmp_path: Path) -> None:
+    """The share of the condition was applied, and the record named the track's."""
+    design = (
+        "design: {conditions: {a: [half], b: none}, tracks: {help: {factor: assist, measure: "
+        "movement_time, at_most: 7, levels: {half: 1, full: 2}, up_down: {}}}}"
+    )
+    written = text("share: {half: 0.5, full: 1}", design=design, track="help", condition="1")
+    with pytest.raises(ProtocolError, match="a track chooses the share of assist here"):
+        a_study(tmp_path, written)
+
+
 @pytest.mark.parametrize("said", WRONG)
 def test_what_cannot_be_is_refused_before_a_session(said: str, tmp_path: Path) -> None:
     with pytest.raises(ProtocolError) as refused:
