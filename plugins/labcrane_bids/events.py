@@ -1,7 +1,7 @@
 """Events: what happened, in seconds from the first sample, with HED tags."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,12 +42,26 @@ FILMED: Mapping[str, dict[str, str]] = {
 }
 """What is known of a film, which is a row of the type ``film``."""
 
-COLUMNS = ("trial", "attempt", "block", "practice", "counted", "outcome", "pair", "direction")
-"""Items of an event's data that become columns; an event in a trial also has those of the trial's
-start."""
-
-WHOLE = ("trial", "attempt", "block", "practice", "counted", "void", FAILED, REPEAT)
-"""Columns of whole numbers; truth is 1."""
+OWN: Mapping[str, dict[str, str]] = {
+    "onset": {"Description": "from the first sample of motion", "Units": "s"},
+    "duration": {
+        "Description": "of a trial; n/a if its end is unknown; 0 for a momentary event",
+        "Units": "s",
+    },
+    "label": {"Description": "name of the event, block and condition"},
+    "response_time": {
+        "Description": "from the trial's start to the first stick beyond its dead zone",
+        "Units": "s",
+    },
+    "void": {"Description": "1 in an attempt that was aborted, or repeated later"},
+    FAILED: {"Description": PRESENTED[FAILED][1]},
+    "counted": {"Description": "1 in a trial that is analysed; 0 in an approach movement"},
+    REPEAT: {
+        "Description": "number among events with the same name and time, from 2; n/a for the first",
+        "HED": "Parameter-value/#",
+    },
+}
+"""Columns of this table. Those of the trial are defined by the recording."""
 
 
 def event_table(session: SessionRecord) -> "pd.DataFrame":
@@ -55,10 +69,12 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
 
     ``trial_type`` is the event's plain name; ``label`` also contains block and condition. A trial's
     start lasts until the trial's end, which is unknown if the process died; all other events are
-    momentary. ``presentation_failed`` is n/a for events outside the trial table, and if nothing was
-    to be shown. ``response_time`` is the reaction time: from the trial's start to the first stick
-    beyond its dead zone. Annotations that were added after the recording have the type
-    ``annotation`` and their text, and films the type ``film``.
+    momentary. Each event of a trial has the items of the trial's start, such as its condition;
+    a name that this table has itself is preceded by ``trial_``. ``presentation_failed`` is n/a for
+    events outside the trial table, and if nothing was to be shown. ``response_time`` is the
+    reaction time: from the trial's start to the first stick beyond its dead zone. Annotations that
+    were added after the recording have the type ``annotation`` and their text, and films the type
+    ``film``.
     """
     import pandas as pd
 
@@ -68,13 +84,16 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
     void, failed = void_attempts(told), presentation_failed(session)
     ended = {attempt_of(data): data for name, data in told if name == END}
     rows = []
-    begun: dict[object, dict[str, Any]] = {}
+    begun: dict[object, Mapping[str, Any]] = {}
+    taken = {"trial_type", *OWN, MARK, CODER, *(f"{FILM}_{fact}" for fact in FILMED)} - {"counted"}
+    columns = _of_trials(told)
     for time, (name, data), label in zip(events["time"], told, labelled(told, failed), strict=True):
         row: Mapping[str, Any] = {}
         if name == "trial.start":
-            begun[data["trial"]] = {key: data[key] for key in COLUMNS if key in data}
+            begun[data["trial"]] = data
             row = ended.get(attempt_of(data), {"ended": math.nan})
-        about = {**begun.get(data.get("trial"), {}), **data}
+        said = {key: data[key] for key in ("attempt", "outcome") if key in data}
+        about = {**data, **begun.get(data.get("trial"), {}), **said}
         rows.append(
             {
                 "onset": time - zero,
@@ -85,7 +104,10 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
                 "void": attempt_of(about) in void if "attempt" in about else None,
                 FAILED: failed.get(attempt_of(about)),
             }
-            | {column: about.get(column) for column in COLUMNS}
+            | {
+                f"trial_{column}" if column in taken else column: about.get(column)
+                for column in columns
+            }
         )
     marks = session.annotations
     rows += [
@@ -103,9 +125,16 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
     table = pd.DataFrame(rows).sort_values("onset", kind="stable", ignore_index=True)
     again = table.groupby(["onset", "trial_type"]).cumcount() + 1
     table[REPEAT] = again.where(again > 1)
-    for name in WHOLE:
-        table[name] = table[name].astype(float).astype("Int64")
+    table = table.convert_dtypes()
+    flags = table.select_dtypes("boolean")
+    table[flags.columns] = flags.astype("Int64")
     return table
+
+
+def _of_trials(told: Sequence[tuple[str, Mapping[str, Any]]]) -> dict[str, None]:
+    """Return what trials are described by: the items of their starts, and their outcome."""
+    starts = (data for name, data in told if name == "trial.start")
+    return dict.fromkeys((*(key for data in starts for key in data), "outcome"))
 
 
 def screen_of(session: SessionRecord) -> dict[str, Any]:
@@ -141,37 +170,10 @@ def event_description(
         MARK: {"Description": "text of an annotation that was added after the recording"},
         CODER: {"Description": "who added it"},
     }
+    films = {f"{FILM}_{fact}": said for fact, said in FILMED.items()}
+    known = {**OWN, **marked, **films, "trial_type": {**types, "HED": hed}}
     return {
-        **(marked if MARK in table else {}),
-        **{name: said for fact, said in FILMED.items() if (name := f"{FILM}_{fact}") in table},
-        "onset": {"Description": "from the first sample of motion", "Units": "s"},
-        "duration": {
-            "Description": "of a trial; n/a if its end is unknown; 0 for a momentary event",
-            "Units": "s",
-        },
-        "trial_type": {**types, "HED": hed},
-        "label": {"Description": "name of the event, block and condition"},
-        "response_time": {
-            "Description": "from the trial's start to the first stick beyond its dead zone",
-            "Units": "s",
-        },
-        "trial": {"Description": "number of the trial in the session"},
-        "attempt": {
-            "Description": "number of the attempt, from 1; above 1 if the trial was repeated"
-        },
-        "block": {"Description": "number of the block in the session"},
-        "practice": {"Description": "1 in a practice trial"},
-        "counted": {"Description": "1 in a trial that is analysed; 0 in an approach movement"},
-        "void": {"Description": "1 in an attempt that was aborted, or repeated later"},
-        FAILED: {"Description": PRESENTED[FAILED][1]},
-        "outcome": {"Description": "how the trial ended"},
-        "pair": {"Description": "pair of targets"},
-        "direction": {"Description": "away from the machine's base, or towards it"},
-        REPEAT: {
-            "Description": "number among events with the same name and time, from 2; n/a for the "
-            "first",
-            "HED": "Parameter-value/#",
-        },
+        **{name: known.get(name) or _of_trial(name, context) for name in map(str, table)},
         "StimulusPresentation": {
             "OperatingSystem": str(context.get("versions", {}).get("system", "n/a")),
             "SoftwareName": "labcrane",
@@ -180,3 +182,14 @@ def event_description(
             **screen,
         },
     }
+
+
+def _of_trial(column: str, context: Mapping[str, Any]) -> dict[str, str]:
+    """Return the recording's description of a column of its trial table."""
+    meanings = context.get("trial_definitions", {})
+    name = column if column in meanings else column.removeprefix("trial_")
+    said = {
+        "Description": meanings.get(name) or name.replace("_", " "),
+        "Units": context.get("trial_units", {}).get(name, ""),
+    }
+    return {key: text for key, text in said.items() if text not in {"", "1"}}

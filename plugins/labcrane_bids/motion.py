@@ -55,9 +55,12 @@ class TrackingSystem:
 
 
 def tracking_systems(session: SessionRecord, every: int) -> Iterator[TrackingSystem]:
-    """Yield the crane, and each stick of the operator."""
-    state, axes = session.streams["state"], session.streams["input"]
+    """Yield the crane, what an assistant shares with the operator, and each stick."""
+    state, axes, command = (session.streams[name] for name in ("state", "input", "command"))
     yield _system("crane", "the simulated machine", state, list(state.units), every)
+    if shared := [column for column in command.units if column.startswith("assist.")]:
+        about = "the assistant's share, and the joint speeds that operator and assistant ask for"
+        yield _system("assist", about, command, shared, every)
     sticks: dict[str, list[str]] = {}
     for column in axes.units:
         sticks.setdefault(column.rpartition(".")[0] or "input", []).append(column)

@@ -117,6 +117,8 @@ def test_events_are_seconds_from_the_first_sample(folder: Path, cohort: Cohort) 
     events = pd.read_csv(folder / f"{MOTION}_events.tsv", sep="\t", na_values="n/a")
     measured = measures_of(cohort.included[0])
     starts = events[(events["trial_type"] == "trial_start") & (events["counted"] == 1)]
+    for value in ("distance", "pair", "far_side", "block"):
+        assert starts[value].to_list() == measured[value].to_list()
     np.testing.assert_allclose(starts["response_time"], measured["reaction_time"])
     np.testing.assert_allclose(starts["onset"], measured["started"] - 100.0, atol=1e-9)
     np.testing.assert_allclose(starts["duration"], measured["ended"] - measured["started"])

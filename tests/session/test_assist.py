@@ -26,6 +26,8 @@ from labcrane.session.visit import Visit
 from labcrane.simulation.simulation import SimulationJob, simulate
 from labcrane.testing import ch8, make_run
 from labcrane.types import FloatArray
+from labcrane_bids.events import event_description, event_table
+from labcrane_bids.motion import tracking_systems
 
 STUDY = (
     """\
@@ -288,6 +290,30 @@ def test_who_moved_what_sums_to_one_and_is_that_of_the_ticks(tmp_path: Path) -> 
         assert row["assist_share"] == pytest.approx(0.3)
         opposed = (np.einsum("ij,ij->i", own, theirs) < 0.0).sum() / 60
         assert row["opposition_time"] == pytest.approx(opposed)
+
+
+@pytest.mark.slow
+def test_bids_has_the_condition_the_feedback_and_both_commands(tmp_path: Path) -> None:
+    design = "design: {conditions: {shared: [half], alone: none}, order: {condition: latin_square}}"
+    shared = text("share: {half: 0.5}", design=design, condition="1")
+    session = open_recording(run(visit(tmp_path, shared), ScriptedConsole())).session(1)
+    events = event_table(session)
+    begun = events[(events["trial_type"] == "trial_start") & (events["counted"] == 1)]
+    trials = session.trials.set_index("trial")
+    for name in ("condition", "feedback", "distance", "pair", "practice"):
+        assert begun[name].to_list() == trials[name][begun["trial"]].to_list(), name
+    within = events[events["trial_type"] == "movement_onset"]
+    assert set(within["condition"]) == {"shared"}
+    about = event_description(events, session.context, {})
+    assert about["condition"]["Description"] == "the condition within participants of the design"
+    assert about["distance"]["Units"] == "m"
+    (assist,) = [each for each in tracking_systems(session, 1) if each.label == "assist"]
+    written = np.vstack([np.column_stack(chunk) for chunk in assist.samples()])[:, 1:]
+    columns = list(assist.channels["name"][1:])
+    assert {column.rpartition(".")[0] for column in columns} == {
+        "assist", "assist.operator", "assist.assistant"
+    }  # fmt: skip
+    assert np.array_equal(written, session.streams["command"].data[columns])
 
 
 @pytest.mark.slow
