@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 import types
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -55,29 +56,41 @@ def test_a_benchmark_whose_programs_are_not_installed_is_not_tried_by_name(
     assert "all 1 are kept" in said
 
 
-def test_what_was_missed_before_and_is_not_measured_now_is_named(
-    benchmarks: types.ModuleType, capsys: pytest.CaptureFixture[str]
+def test_what_another_computer_missed_is_named_and_fails_the_check(
+    benchmarks: types.ModuleType,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    benchmarks.main([])
-    with benchmarks.RESULTS.open("a", encoding="utf-8") as table:
-        table.write("| slow | a leap, us | 1 | a bare one | 1 | 1.00 |  | long ago |\n")
+    results = importlib.import_module("benchmarks.results")
+    with monkeypatch.context() as there:
+        there.setattr(results, "machine", lambda: "a slower one")
+        benchmarks.main([])
+    rows = [results.Row("slow", "a step, us", 3.0, 3.0, "a bare one", 2.0)]
+    monkeypatch.setattr(sys.modules["benchmarks.slow"], "rows", lambda **_: rows)
     capsys.readouterr()
     assert benchmarks.main(["--check", "--only", "fine"]) == 0
-    *_, kept, limitless = capsys.readouterr().out.splitlines()
-    assert kept.startswith("MISSED BEFORE slow: a step, us: 2.10 of 2.00, kept of 20")
-    assert limitless == (
-        "MISSED BEFORE slow: a leap, us: 1.00, without a limit, kept of long ago; "
-        "measure slow again"
-    )
-    benchmarks.main([])
-    assert "MISSED BEFORE" not in capsys.readouterr().out
+    assert benchmarks.main(["--check"]) == 1
+    (kept,) = [line for line in capsys.readouterr().out.splitlines() if "MISSED" in line]
+    assert kept.startswith("MISSED slow: a step, us: 2.10 (6.3 / 3, 20")
+    assert kept.endswith(" of 2.00 on a slower one; measure it again there")
 
 
-def test_the_table_is_what_was_measured_with_every_limit(benchmarks: types.ModuleType) -> None:
-    benchmarks.main([])
-    *_, fine, slow = benchmarks.RESULTS.read_text(encoding="utf-8").splitlines()
-    assert fine.startswith("| fine | a step, us | 3 | a bare one | 3 | 1.00 | 2.00 | 20")
-    assert slow.startswith("| slow | a step, us | 6.3 | a bare one | 3 | 2.10 | 2.00 | 20")
+def test_the_table_has_a_column_for_each_computer(
+    benchmarks: types.ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results = importlib.import_module("benchmarks.results")
+    for computer, subjects in {"old": [], "new": ["--only", "fine"]}.items():
+        monkeypatch.setattr(results, "machine", lambda computer=computer: computer)
+        benchmarks.main(subjects)
+    *_, head, _, fine, slow = benchmarks.RESULTS.read_text(encoding="utf-8").splitlines()
+    assert head == "| benchmark | figure | reference | at most | old | new |"
+    day = datetime.now(UTC).date()
+    cell = f"1.00 (3 / 3, {day})"
+    assert fine == f"| fine | a step, us | a bare one | 2.00 | {cell} | {cell} |"
+    assert slow == f"| slow | a step, us | a bare one | 2.00 | 2.10 (6.3 / 3, {day}) |  |"
+    monkeypatch.setattr(sys.modules["benchmarks.fine"], "rows", lambda **_: [])
+    benchmarks.main(["--only", "fine"])
+    assert "| fine |" not in benchmarks.RESULTS.read_text(encoding="utf-8"), "no such figure"
 
 
 @pytest.mark.parametrize("error", [FileNotFoundError("no jackd"), SystemExit(3)])
@@ -112,13 +125,10 @@ def test_a_benchmark_without_a_figure_is_missed(
     assert "MISSED fine gave no figure\n" in capsys.readouterr().out
 
 
-def test_the_table_that_is_kept_has_the_head_and_the_columns_that_are_written_now() -> None:
+def test_the_table_that_is_kept_is_the_one_that_is_written_now() -> None:
     main = importlib.import_module("benchmarks.__main__")
     text = main.RESULTS.read_text(encoding="utf-8")
-    assert text.startswith(main.head())
-    rows = text.removeprefix(main.head()).splitlines()
-    assert {row.split("|")[1].strip() for row in rows} <= set(main.SUBJECTS)
-    assert {row.count("|") for row in rows} == {main.HEAD.count("|")}
+    assert main.Results.read(main.RESULTS).text(main.SUBJECTS) == text
 
 
 IN_SECONDS = (
