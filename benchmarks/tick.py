@@ -1,7 +1,8 @@
 """Cost of a whole tick beside a bare PyBullet tick, and the highest rate held.
 
-    python -m benchmarks.tick
+    python -m benchmarks.tick [--profile]
 
+With ``--profile`` it prints what each part of a tick takes.
 A bare tick sets four motors, steps the engine and reads four joints, with the engine settings that
 the crane needs. A whole tick reads axes, applies the scheme, moves the crane, judges the aiming
 task, writes the frame through to the journal, and with LSL sends it to three outlets that a process
@@ -114,8 +115,19 @@ def study_at(rate_hz: float, folder: Path) -> Study:
     return load(path, discover())
 
 
-def whole(study: Study, folder: Path, clock: Clock, count: int, *, lsl: bool) -> list[Frame]:
-    """Run ``count`` whole ticks; return their frames, and the end of each in ``frame.elapsed``."""
+def whole(
+    study: Study,
+    folder: Path,
+    clock: Clock,
+    count: int,
+    *,
+    lsl: bool,
+    parts: dict[str, float] | None = None,
+) -> list[Frame]:
+    """Run ``count`` whole ticks; return their frames, and the end of each in ``frame.elapsed``.
+
+    ``parts`` gets the seconds that each part of the ticks takes, if it is given.
+    """
     plan = plan_session(study, "P001", 1)
     rig = Rig.build(study, simulated=True)
     rig = replace(rig, input=Waves(study.protocol.rate_hz))
@@ -129,10 +141,64 @@ def whole(study: Study, folder: Path, clock: Clock, count: int, *, lsl: bool) ->
         sequencer = Sequencer(study, plan, rig, waits=False)
         path = folder / f"{time.perf_counter_ns()}.xdf"
         with SessionJournal(path, columns(run), run.rate_hz) as journal, outlets(run, lsl) as push:
-            log, sinks = FrameLog(journal, run), (*push, end_of_tick)
+            log = FrameLog(journal, run)
+            sinks = (*push, end_of_tick)
+            if parts is not None:
+                for part, owner, method in parts_of(rig, sequencer, log):
+                    setattr(owner, method, timed(parts, part, getattr(owner, method)))
+                sinks = (*(timed(parts, "show", each) for each in push), end_of_tick)
             loop.run(rig, run, sequencer, clock, UntilTick(count), log, sinks)
         path.unlink()
     return seen
+
+
+def parts_of(rig: Rig, sequencer: Sequencer, log: FrameLog) -> list[tuple[str, object, str]]:
+    """Return the parts of a tick in their order, with the methods that :mod:`~.loop` calls."""
+    return [
+        ("read", rig.input, "read"),
+        ("handle orders", sequencer, "keep_time"),
+        ("handle orders", sequencer, "handle"),
+        ("control", rig.controller, "command"),
+        ("control", rig.controller, "idle"),
+        ("step", rig.dynamics, "state"),
+        ("step", rig.dynamics, "step"),
+        ("judge", sequencer, "evaluate"),
+        ("write", log, "write"),
+    ]
+
+
+def timed(
+    parts: dict[str, float], part: str, method: Callable[..., object]
+) -> Callable[..., object]:
+    """Return a method that adds its seconds to a part."""
+    parts.setdefault(part, 0.0)
+
+    def call(*values: object) -> object:
+        began = time.perf_counter()
+        result = method(*values)
+        parts[part] += time.perf_counter() - began
+        return result
+
+    return call
+
+
+def profile(count: int = TICKS) -> str:
+    """Return what each part of a tick takes, in us, beside the engine alone.
+
+    Timers take 0.1 us a call, which counts for the rest.
+    """
+    use_loopback()
+    parts: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as name:
+        study = study_at(240.0, Path(name))
+        clock = ManualClock(time.perf_counter())
+        with BareEngine(study.machine, study.protocol.rate_hz, PASSES) as engine:
+            bare = float(np.mean(bare_times(engine, count)))
+        frames = whole(study, Path(name), clock, count, lsl=True, parts=parts)
+    all_ = (frames[-1].elapsed - frames[0].elapsed) * count / (count - 1)
+    found = {**parts, "the rest": all_ - sum(parts.values()), "whole tick": all_}
+    lines = [f"{part:16}{1e6 * seconds / count:8.1f} us" for part, seconds in found.items()]
+    return "\n".join([*lines, f"{'bare PyBullet':16}{1e6 * bare:8.1f} us"])
 
 
 @contextmanager
@@ -366,6 +432,8 @@ def rate_row(held: Mapping[str, float]) -> Row:
 
 
 if __name__ == "__main__":
+    if sys.argv[1:] == ["--profile"]:
+        sys.exit(print(profile()))
     use_loopback()
     with tempfile.TemporaryDirectory() as name:
         cost(Path(name))

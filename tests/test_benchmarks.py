@@ -161,6 +161,27 @@ def test_a_ratio_that_is_no_number_is_missed() -> None:
     assert table.missed([nothing])
 
 
+@pytest.mark.slow
+@needs("pybullet")
+def test_the_parts_of_a_tick_sum_up_and_a_slow_one_is_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tick = importlib.import_module("benchmarks.tick")
+    plain = tick.Waves.read
+
+    def read(waves: object, *values: object) -> object:
+        time.sleep(0.002)
+        return plain(waves, *values)
+
+    monkeypatch.setattr(tick.Waves, "read", read)
+    found = {line[:16].strip(): float(line[16:-3]) for line in tick.profile(200).splitlines()}
+    del found["bare PyBullet"]
+    whole = found.pop("whole tick")
+    assert sum(found.values()) == pytest.approx(whole, abs=1.0)
+    assert found["read"] > 2000.0
+    assert all(found[part] < 1000.0 for part in ("control", "step", "judge", "write", "show"))
+
+
 @needs("pybullet")
 @pytest.mark.parametrize("slower_s", [0.0, 0.002])
 def test_a_component_that_takes_two_milliseconds_more_a_tick_is_missed(
