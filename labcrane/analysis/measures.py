@@ -33,7 +33,7 @@ from labcrane.analysis.sticks import (
     stick_use,
 )
 from labcrane.analysis.tables.body import BodySignals
-from labcrane.analysis.tables.definitions import MEASURES
+from labcrane.analysis.tables.definitions import MEASURES, OF_ASSISTANCE
 from labcrane.analysis.tables.measure_cache import kept
 from labcrane.analysis.tables.responses import STIMULUS, in_trials, responses
 from labcrane.analysis.unusable import Unusable
@@ -314,10 +314,6 @@ def _deflection(axes: Mapping[str, FloatArray], stick: str) -> FloatArray:
     own = [values for name, values in axes.items() if name.rpartition(".")[0] == stick]
     deflection: FloatArray = np.linalg.norm(own, axis=0)
     return deflection
-
-
-OF_ASSISTANCE = ("assist_share", "operator_part", "assistant_part", "opposition_time")
-"""Measures of a study with an assistant."""
 
 
 def _assistance(movement: Movement, span: slice) -> dict[str, float]:

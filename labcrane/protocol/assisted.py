@@ -23,6 +23,9 @@ from labcrane.types import FloatArray
 OF_ASSISTANT = f"{ASSIST}."
 """What the names of the assistant's axes begin with."""
 
+SALT = 4
+"""Keeps what an assistant draws by chance apart from what a simulated operator draws."""
+
 PRESSED = 0.5
 """Value of a button above which it is down."""
 
@@ -56,11 +59,14 @@ class FourHands(InputDevice):
     def open(self, run: Run) -> None:
         operators, assistants = _each_ones(run.axes)
         self._operator.open(replace(run, axes=operators))
-        self._assistant.open(replace(run, axes=assistants, inverse=self._inverse))
+        seed = _other(run.participant_seed)
+        self._assistant.open(
+            replace(run, axes=assistants, inverse=self._inverse, participant_seed=seed)
+        )
 
     def begin_trial(self, trial: Trial) -> None:
         self._operator.begin_trial(trial)
-        self._assistant.begin_trial(trial)
+        self._assistant.begin_trial(replace(trial, seed=_other(trial.seed)))
 
     def close(self) -> None:
         with ExitStack() as closing:
@@ -73,6 +79,10 @@ class FourHands(InputDevice):
 
     def read(self, tick: Tick, seen: Frame) -> FloatArray:
         return np.concatenate([self._operator.read(tick, seen), self._assistant.read(tick, seen)])
+
+
+def _other(seed: int) -> int:
+    return int(np.random.default_rng([seed, SALT]).integers(2**32))
 
 
 class Assisted(Controller):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeGuard
 
-from labcrane.analysis.tables.definitions import MEASURES
+from labcrane.analysis.tables.definitions import MEASURES, OF_ASSISTANCE
 from labcrane.core.records import Value
 from labcrane.core.roles import (
     Capture,
@@ -318,7 +318,10 @@ class Checker:
         ]
         known = [*dict.fromkeys([*given, *MEASURES])]
         for number, name in enumerate(self._protocol.design.primary):
-            if name not in known:
+            if name in OF_ASSISTANCE and self._protocol.assist is None:
+                message = f"{name} needs an assistant; add assist:, or drop it"
+                self._source.problem(("design", "primary", number), message)
+            elif name not in known:
                 message = f"there is no outcome {name!r}; {nearest(name, known, 'there is')}"
                 self._source.problem(("design", "primary", number), message)
 

@@ -206,6 +206,9 @@ WRONG = {
     "assist moves left.x, right.y, and the scheme uses left.y, right.x": text(
         "share: 1, axes: [left.x, right.y]"
     ),
+    "opposition_time needs an assistant; add assist:, or drop it": text(
+        design="design: {primary: [opposition_time]}"
+    ),
     "'half' is already the name of a feedback": text(
         "share: {half: 1}", design="feedback: {half: {use: sphere}}", feedback="[half]"
     ),
@@ -314,6 +317,15 @@ def test_bids_has_the_condition_the_feedback_and_both_commands(tmp_path: Path) -
         "assist", "assist.operator", "assist.assistant"
     }  # fmt: skip
     assert np.array_equal(written, session.streams["command"].data[columns])
+
+
+@pytest.mark.slow
+def test_a_simulated_assistant_is_not_the_simulated_operators_twin(tmp_path: Path) -> None:
+    shared = text("share: 0.5").replace("use: toward_target", "use: simulated_operator")
+    seen = rehearse(a_study(tmp_path, shared))
+    places = [seen.run.axes.find(name) for name in ("left", "assist.left")]
+    own, theirs = (np.array([frame.axes[place] for frame in seen.frames]) for place in places)
+    assert not np.array_equal(own, theirs)
 
 
 @pytest.mark.slow

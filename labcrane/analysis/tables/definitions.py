@@ -87,3 +87,6 @@ MEASURES: Mapping[str, tuple[str, str]] = {
     ),
 }
 """Unit and meaning of what is measured here; the trial table's own columns come in addition."""
+
+OF_ASSISTANCE = ("assist_share", "operator_part", "assistant_part", "opposition_time")
+"""Those that only a study with an assistant has."""
