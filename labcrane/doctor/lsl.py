@@ -108,6 +108,21 @@ def _needs(requests: Sequence[StreamRequest], there: Sequence[FoundStream]) -> I
                 yield Finding(Verdict.FAIL, f"{text}, but it {' and '.join(misfits)}", fix)
             else:
                 yield Finding(Verdict.PASS, text)
+                yield from _declared(request, one)
+
+
+def _declared(request: StreamRequest, one: FoundStream) -> Iterator[Finding]:
+    """Propose how the protocol can declare the stream of a known program."""
+    program = one.program
+    if program is None:
+        return
+    said = {key: getattr(request, key) for key in program.declared}
+    if said != program.declared:
+        text = f"stream {request} looks like that of {program.name}, which {program.stamps}"
+        new = ", ".join(f"{key}: {value}" for key, value in program.declared.items())
+        old = ", ".join(f"{key}: {value}" for key, value in said.items() if value)
+        fix = f"write {new} for it in the protocol{f' in place of {old}' if old else ''}"
+        yield Finding(Verdict.WARN, text, fix)
 
 
 def _whose(request: StreamRequest, fitting: Sequence[FoundStream]) -> Iterator[Finding]:

@@ -122,6 +122,7 @@ class StreamNeed(Settings):
             rate_hz=self.rate_hz,
             channels=self.channels,
             counter=self.counter,
+            stamped=self.stamped,
             several=self.several,
             any_meant=f"streams.{label}" in expected,
         )

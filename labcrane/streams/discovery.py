@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from labcrane.errors import RecordingError
 from labcrane.recording.xdf.header import StreamHeader
+from labcrane.streams.known_programs import KnownProgram, program_of
 from labcrane.streams.probes import ClockProbe, Probe
 from labcrane.streams.request import unstable_id
 from labcrane.streams.search import find
@@ -33,6 +34,8 @@ class FoundStream:
         when it does not answer.
     warnings
         What will make it hard to record.
+    program
+        The program that sends it, where its header shows that.
     """
 
     name: str
@@ -47,6 +50,7 @@ class FoundStream:
     offset_s: float | None
     rtt_s: float | None
     warnings: tuple[str, ...]
+    program: KnownProgram | None = None
 
 
 def discover(wait_s: float = 1.5) -> list[FoundStream]:
@@ -76,6 +80,7 @@ def _describe(info: "pylsl.StreamInfo") -> FoundStream:
         offset_s=None if probe is None else probe.offset,
         rtt_s=None if probe is None else probe.rtt,
         warnings=tuple(_warnings(info, header, probe)),
+        program=None if header is None else program_of(header),
     )
 
 

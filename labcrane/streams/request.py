@@ -43,6 +43,8 @@ class StreamRequest:
         What is expected of it; None is anything.
     counter
         Label of a channel that counts samples, to find lost ones.
+    stamped
+        When its samples get their timestamps, if the protocol says so.
     several
         Whether all streams that fit are meant, and not one.
     any_meant
@@ -61,6 +63,7 @@ class StreamRequest:
     rate_hz: float | None = None
     channels: int | None = None
     counter: str | None = None
+    stamped: str | None = None
     several: bool = False
     any_meant: bool = False
     confirmed: Identity | None = None

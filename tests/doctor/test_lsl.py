@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pylsl
@@ -15,6 +16,7 @@ from recording.test_full_disk import needs_mounts
 
 from labcrane.core.findings import Finding, Verdict
 from labcrane.doctor import lsl
+from labcrane.streams.known_programs import KNOWN
 from labcrane.streams.network import free_ports, port_range
 from labcrane.streams.request import StreamRequest
 
@@ -95,6 +97,54 @@ def test_a_stream_asked_for_by_its_type_alone_is_asked_about_and_rivals_are_refu
     assert asked.advice == "set the source_id of the right stream in the protocol"
     assert not [one for one in found if "stream all" in one.text and "any of" in one.text]
     assert not [one for one in found if "stream known" in one.text and "asks" in one.text]
+
+
+@pytest.mark.slow
+def test_the_stream_of_a_known_program_gets_a_proposal_for_the_protocol() -> None:
+    made = []
+    for name, source, maker in (
+        ("EyeLogic", f"EyeLogic One | {os.getpid()}", "EyeLogic"),
+        ("BrainAmpSeries-0", f"BrainAmpSeries-0_{os.getpid()}", "Brain Products"),
+        ("EyeLogic", f"another {os.getpid()}", "labcrane"),
+    ):
+        info = pylsl.StreamInfo(name, "Known", 2, 250.0, "float32", source)
+        info.desc().append_child("acquisition").append_child_value("manufacturer", maker)
+        made.append((source, pylsl.StreamOutlet(info)))
+    gaze, eeg, other = (source for source, _ in made)
+    found = lsl.examine(
+        [
+            StreamRequest("gaze", source_id=gaze, stamped="when_sent"),
+            StreamRequest("eeg", source_id=eeg),
+            StreamRequest("right", source_id=eeg, stamped="when_sent"),
+            StreamRequest("other", source_id=other),
+        ]
+    )
+    told = {one.text.split()[1]: one for one in found if "looks like that of" in one.text}
+    assert set(told) == {"gaze", "eeg"}
+    assert told["gaze"].advice == (
+        "write stamped: at_sampling, counter: FrameNumber for it in the protocol in place of "
+        "stamped: when_sent"
+    )
+    assert told["eeg"].text.endswith(
+        "looks like that of App-BrainAmpSeries, which stamps a chunk with the time at which it "
+        "read it"
+    )
+    assert told["eeg"].advice == "write stamped: when_sent for it in the protocol"
+    del made
+
+
+def test_each_known_program_is_in_the_docs_with_what_to_declare() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "devices.md").read_text(encoding="utf-8")
+    rows = [line for line in page.splitlines() if line.startswith("| `")]
+    expected = [
+        f"| `{program.name}` | {program.stamps} | "
+        f"{', '.join(f'`{key}: {value}`' for key, value in program.declared.items())} | "
+        f"`{program.source}` |"
+        for program in KNOWN
+    ]
+    assert [
+        row for row in rows if row.startswith(tuple(f"| `{p.name}`" for p in KNOWN))
+    ] == expected
 
 
 def test_ports_that_others_have_taken_are_counted() -> None:
