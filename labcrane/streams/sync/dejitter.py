@@ -27,7 +27,8 @@ FEWEST = 50
 MOST_BLOCKS = 100
 
 STRETCH_S = 120.0
-BLOCK_S = 0.05
+
+ROUNDING_S = 1e-12
 
 PASSING_S, SOON_S = 5.0, 1.0
 """Delays pass within the first; what has shifted all samples for longer is a gap. Within the second
@@ -76,8 +77,7 @@ def follow_sample_clock(times: FloatArray, index: FloatArray) -> tuple[FloatArra
     index
         Which sample each one is, shape ``(n,)``.
     """
-    away = index - index.mean()
-    due = float(away @ (times - times.mean())) / float(away @ away) * (index - index[0])
+    due = even_line(times, index)
     blocks = np.array_split(np.arange(len(times)), min(max(len(times) // FEWEST, 3), MOST_BLOCKS))
     middle = np.array([float(due[block].mean()) for block in blocks])
     rest = np.array([float((times[block] - due[block]).mean()) for block in blocks])
@@ -175,41 +175,19 @@ def _envelope(times: FloatArray, index: FloatArray) -> Line:
     """Return the highest line below all times: the hull's edge under their middle.
 
     Moon, Skelly and Towsley 1999, Estimation and removal of clock skew from network delay
-    measurements.
+    measurements. Whatever is below a line takes the place of its end on that side.
     """
     rough = _least_squares(times, index)
-    low_index, low_late = _lowest(index, times - rough(index), times)
-    hull = _lower_hull(low_index, low_late)
-    middle = (index[0] + index[-1]) / 2
-    k = int(np.clip(np.searchsorted(hull[:, 0], middle), 1, len(hull) - 1))
-    (x0, y0), (x1, y1) = hull[k - 1], hull[k]
-    slope = (y1 - y0) / (x1 - x0)
-    return lambda at: rough(at) + y0 + slope * (at - x0)
-
-
-def _lowest(
-    index: FloatArray, late: FloatArray, times: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the earliest sample of each twentieth of a second: only those can be on the hull."""
-    span = float(times[-1] - times[0])
-    size = max(int(len(late) * BLOCK_S / span), 1) if span > 0 else 1
-    whole = len(late) // size * size
-    if whole // size < 3:  # noqa: PLR2004
-        return index, late
-    chosen = np.argmin(late[:whole].reshape(-1, size), axis=1) + np.arange(0, whole, size)
-    chosen = np.r_[chosen, np.arange(whole, len(late))]
-    return index[chosen], late[chosen]
-
-
-def _lower_hull(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Return the lower convex hull (Andrew's monotone chain), shape ``(n, 2)``."""
-    hull: list[tuple[float, float]] = []
-    for point in zip(x.tolist(), y.tolist(), strict=True):
-        while len(hull) > 1 and _turns_right(hull[-2], hull[-1], point):
-            hull.pop()
-        hull.append(point)
-    return np.array(hull)
-
-
-def _turns_right(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) <= 0.0
+    late, away = times - rough(index), index - (index[0] + index[-1]) / 2
+    left, right = 0, len(late) - 1
+    while True:
+        slope = (late[right] - late[left]) / (away[right] - away[left])
+        above = late - late[left] - slope * (away - away[left])
+        lowest = int(np.argmin(above))
+        if above[lowest] > -ROUNDING_S:
+            first, level = index[left], late[left]
+            return lambda at: rough(at) + level + slope * (at - first)
+        if away[lowest] < 0.0:
+            left = lowest
+        else:
+            right = lowest
