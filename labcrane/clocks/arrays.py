@@ -137,7 +137,7 @@ def correct(
         when = _column("arrivals", arrivals, count)
         came = np.column_stack([np.arange(1.0, count + 1.0), when])
     index = None if counter is None else _column("counter", counter, count)
-    own = None
+    own = np.empty((0, 2))
     if own_clock is not None:
         own = np.asarray(own_clock, dtype=np.float64)
         if own.ndim != 2 or own.shape[1] != 2 or not np.isfinite(own).all():  # noqa: PLR2004
@@ -151,7 +151,7 @@ def correct(
         latency_s=latency_s,
         dejitter=EVENING[evening],
     )
-    return correct_raw(RawStream.of(taken, shown, came, index=index, own=own), treatment, end)
+    return correct_raw(RawStream(taken, shown, came, index=index, own=own), treatment, end)
 
 
 def _chosen(name: str, value: str, choices: Collection[str]) -> None:

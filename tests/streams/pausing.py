@@ -56,7 +56,7 @@ def pausing(random, *, whole: bool, arrivals: bool, scatter: float | None = None
         told = {"stamped": times + noise, "sent": times + 0.01}
     drawn = received(random, Clock(random), times, rate, clean=False, chance=True, **told)
     if not arrivals:
-        drawn = replace(drawn, raw=RawStream.of(drawn.raw.stamps, drawn.raw.probes))
+        drawn = replace(drawn, raw=RawStream(drawn.raw.stamps, drawn.raw.probes))
     missing = int(np.round(holes * own).sum())
     big = holes * own > 0.5
     return Paused(drawn, missing, int(big.sum()), float(steps[at].max()), scatter)
@@ -76,7 +76,7 @@ def stalling(random, *, arrivals: bool) -> Drawn:
     times = np.maximum.accumulate(due + waited - one_by_one) + one_by_one
     drawn = received(random, Clock(random), times, rate, clean=False, chance=True)
     if not arrivals:
-        drawn = replace(drawn, raw=RawStream.of(drawn.raw.stamps, drawn.raw.probes))
+        drawn = replace(drawn, raw=RawStream(drawn.raw.stamps, drawn.raw.probes))
     return drawn
 
 

@@ -48,7 +48,7 @@ def arrivals(times, *, every=0.03, travel_s=200e-6):
 def source(clock, times, random, *, stamped=None, travel_s=200e-6, every=1.0, reply_s=0.0):
     """Return what is received of a source that samples at ``times`` of our clock."""
     span = times[0] + 0.3, times[-1] + 1.0
-    return RawStream.of(
+    return RawStream(
         clock(times if stamped is None else stamped),
         probes=probe(clock, *span, random, every=every, reply_s=reply_s),
         arrivals=arrivals(times if stamped is None else stamped, travel_s=travel_s),
@@ -59,7 +59,7 @@ def after_one_another(first: RawStream, second: RawStream, told: float) -> RawSt
     """Return two sources received as one, the second in place of the first."""
     n = len(first.stamps)
     later = second.arrivals + np.array([n, 0.0])
-    return RawStream.of(
+    return RawStream(
         np.r_[first.stamps, second.stamps],
         probes=np.concatenate([first.probes, second.probes]),
         arrivals=np.concatenate([first.arrivals, later]),

@@ -115,7 +115,7 @@ def test_a_chunk_that_holds_both_sources_is_cut_between_them(random, kind):
     raw = after_one_another(first, second, told=163.5)
     n = len(times)
     resets = np.array([[163.5, n - 20.0, n + 30.0]])
-    raw = RawStream.of(raw.stamps, raw.probes, raw.arrivals, resets)
+    raw = RawStream(raw.stamps, raw.probes, raw.arrivals, resets)
     corrected = correct(raw, REGULAR if kind == "regular" else MARKERS)
     assert np.abs(corrected.time - np.r_[times, later]).max() < 1e-5
 
@@ -136,7 +136,7 @@ def test_a_source_replaced_before_its_first_probe_is_placed_by_arrival(random, o
     times, later = regular(0.8), regular(60) + 4.0
     first = SourceClock(offset=offset)(times)
     second = SourceClock(offset=5000.0)
-    raw = RawStream.of(
+    raw = RawStream(
         np.r_[first, second(later)],
         probes=probe(second, 104.2, 164.0, random),
         arrivals=arrivals(np.r_[times, later]),
@@ -154,7 +154,7 @@ def test_samples_that_the_network_held_up_keep_their_time(random):
     held = raw.arrivals.copy()
     stuck = (held[:, 1] > 140.0) & (held[:, 1] < 175.0)
     held[stuck, 1] = 175.0
-    corrected = correct(RawStream.of(raw.stamps, raw.probes, held), REGULAR)
+    corrected = correct(RawStream(raw.stamps, raw.probes, held), REGULAR)
     assert np.abs(corrected.time - times).max() < 1e-5
     assert len(corrected.segments) == 1
 
@@ -164,7 +164,7 @@ def test_markers_may_tell_of_what_happened_before(random):
     times = irregular(random)
     stamped = times - random.uniform(0.0, 5.0, len(times))
     clock = SourceClock()
-    raw = RawStream.of(clock(stamped), probe(clock, 100.3, 221.0, random), arrivals(times))
+    raw = RawStream(clock(stamped), probe(clock, 100.3, 221.0, random), arrivals(times))
     assert p95(correct(raw, MARKERS), stamped) < 5e-6
 
 
@@ -174,7 +174,7 @@ def test_samples_that_a_device_held_back_are_not_moved(random, late_s):
     times = regular()
     honest = source(SourceClock(), times, random)
     held = honest.arrivals + np.array([0.0, late_s])
-    corrected = correct(RawStream.of(honest.stamps, honest.probes, held), REGULAR)
+    corrected = correct(RawStream(honest.stamps, honest.probes, held), REGULAR)
     assert corrected.quality.whose == ""
     assert np.abs(corrected.time - times).max() < 1e-5
     assert corrected.quality.error_p95_s == pytest.approx(late_s, rel=0.05)
@@ -185,7 +185,7 @@ def test_stamps_of_a_clock_that_lsl_does_not_know_are_told(random, foreign):
     """Some programs stamp with the time of day, or with what the device counts."""
     times = regular(60)
     honest = source(SourceClock(ppm=0.0), times, random)
-    raw = RawStream.of(honest.stamps + foreign, honest.probes, honest.arrivals)
+    raw = RawStream(honest.stamps + foreign, honest.probes, honest.arrivals)
     corrected = correct(raw, REGULAR)
     assert corrected.quality.lag_s == pytest.approx(-foreign, rel=1e-5)
     assert corrected.quality.whose == "foreign"
@@ -224,7 +224,7 @@ def test_a_clock_whose_stamps_go_on_evenly_was_turned_and_did_not_step(random, k
     raw = source(lambda t: clock(t) + 0.01 * np.clip(t - 160.0, 0.0, 2.0), times, random)
     turned = (raw.probes[:, 3] > 159.0) & (raw.probes[:, 3] < 163.5)
     corrected = correct(
-        RawStream.of(raw.stamps, raw.probes[~turned], raw.arrivals),
+        RawStream(raw.stamps, raw.probes[~turned], raw.arrivals),
         REGULAR if kind == "regular" else MARKERS,
     )
     assert corrected.quality.steps == (0 if kind == "regular" else 1)
@@ -291,7 +291,7 @@ def test_a_sampler_is_steady_only_where_its_count_is_sure(random):
 def test_a_clock_that_was_probed_once_is_placed_by_that_probe(random):
     times = regular(2.0)
     raw = source(SourceClock(), times, random)
-    corrected = correct(RawStream.of(raw.stamps, raw.probes[:1], raw.arrivals), REGULAR)
+    corrected = correct(RawStream(raw.stamps, raw.probes[:1], raw.arrivals), REGULAR)
     assert np.abs(corrected.time - times).max() < 5e-4
     assert (np.abs(corrected.time - times) <= corrected.error).all()
     assert corrected.quality.slews == 0
@@ -301,7 +301,7 @@ def test_a_long_time_without_probes_is_no_step(random):
     times = regular(600)
     raw = source(SourceClock(ppm=150.0), times, random)
     away = (raw.probes[:, 3] > 200.0) & (raw.probes[:, 3] < 500.0)
-    corrected = correct(RawStream.of(raw.stamps, raw.probes[~away], raw.arrivals), REGULAR)
+    corrected = correct(RawStream(raw.stamps, raw.probes[~away], raw.arrivals), REGULAR)
     assert len(corrected.segments) == 1
     assert p95(corrected, times) < 5e-5
     assert corrected.quality.probe_age_s == pytest.approx(150.0, abs=2.0)
@@ -316,7 +316,7 @@ def test_latency_is_subtracted_last(random):
 
 def test_a_transport_delay_needs_the_envelope():
     with pytest.raises(RecordingError, match="envelope"):
-        correct(RawStream.of(np.arange(9.0)), Treatment(rate_hz=500.0, transport_s=0.008))
+        correct(RawStream(np.arange(9.0)), Treatment(rate_hz=500.0, transport_s=0.008))
 
 
 def test_correction_alters_nothing_and_can_be_repeated(random):
@@ -329,8 +329,8 @@ def test_correction_alters_nothing_and_can_be_repeated(random):
 
 
 def test_a_stream_without_samples_or_probes_breaks_nothing():
-    assert len(correct(RawStream.of(np.empty(0)), REGULAR).time) == 0
-    unknown = correct(RawStream.of(np.arange(100.0)), REGULAR)
+    assert len(correct(RawStream(np.empty(0)), REGULAR).time) == 0
+    unknown = correct(RawStream(np.arange(100.0)), REGULAR)
     assert np.isnan(unknown.time).all()
     assert unknown.segments[0].basis is Basis.NOTHING
     assert unknown.quality.unprobed == 100

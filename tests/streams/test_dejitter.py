@@ -82,7 +82,7 @@ def test_a_counter_bridges_missing_samples(random):
     times = whole[kept]
     stamped = chunks(whole, random)[kept]
     raw = source(SourceClock(), times, random, stamped=stamped)
-    raw = RawStream.of(raw.stamps, raw.probes, raw.arrivals, index=kept.astype(float))
+    raw = RawStream(raw.stamps, raw.probes, raw.arrivals, index=kept.astype(float))
     corrected = correct(raw, Treatment(500.0, dejitter=Dejitter.ENVELOPE, transport_s=0.008))
     assert p95(corrected, times) < 1e-4
     assert corrected.quality.dropped == 10

@@ -31,7 +31,7 @@ def restarting(random: np.random.Generator, rate: float) -> tuple[RawStream, np.
         told = at - now + up
         probes.append(np.column_stack([told, at - told, np.full(len(at), 1e-3), at + 1.2]))
         now += length + random.uniform(40.0, 200.0)
-    return RawStream.of(np.concatenate(stamps), np.concatenate(probes)), np.concatenate(truth)
+    return RawStream(np.concatenate(stamps), np.concatenate(probes)), np.concatenate(truth)
 
 
 @pytest.mark.parametrize("rate", [0.0, 100.0])
@@ -65,7 +65,7 @@ def test_stamps_that_go_back_while_offsets_go_on_state_it(seed: int, right: str)
     scatter = random.uniform(-1.0, 1.0, len(times)) * random.uniform(0.0, 0.2) / rate
     clock = Clock(random)
     drawn = received(random, clock, times + scatter, rate, stamped=times + scatter + wrong)
-    raw = RawStream.of(drawn.raw.stamps, drawn.raw.probes)
+    raw = RawStream(drawn.raw.stamps, drawn.raw.probes)
     corrected = correct(raw, drawn.treatment)
     assert np.mean(np.abs(corrected.time - drawn.truth) <= corrected.error) >= 0.99
     told = judge_quality(corrected.quality, rate, len(times), Limits())
@@ -98,7 +98,7 @@ def test_stamps_that_go_back_by_whole_periods_state_it(seed: int) -> None:
     stamps = np.where(np.arange(len(times)) < at, times, np.roll(times, back))
     told = np.arange(1000.0, 1060.0, 5.0)
     shown = np.column_stack([told, np.zeros(len(told)), np.full(len(told), 1e-3), told])
-    corrected = correct(RawStream.of(stamps, shown), Treatment(1.0 / period))
+    corrected = correct(RawStream(stamps, shown), Treatment(1.0 / period))
     assert np.mean(np.abs(corrected.time - times) <= corrected.error) >= 0.99
     assert corrected.quality.repeated == 0
     assert corrected.quality.rate_hz == pytest.approx(1.0 / period, rel=1e-3)
@@ -140,7 +140,7 @@ def test_markers_whose_clock_was_set_back_state_it_where_one_lies_behind_another
     stamps = np.where(np.arange(len(times)) < at, times, times - back)
     told = np.arange(START, START + 300.0, 5.0)
     shown = np.column_stack([told, np.zeros(len(told)), np.full(len(told), 1e-3), told])
-    corrected = correct(RawStream.of(stamps, shown), Treatment())
+    corrected = correct(RawStream(stamps, shown), Treatment())
     if stamps[at] > stamps[at - 1]:
         assert corrected.quality.backward == 0
         return
@@ -158,6 +158,6 @@ def test_markers_sent_late_again_and_again_keep_their_times() -> None:
     late[10::40], late[11::40] = times[11::40], times[10::40]
     told = np.arange(START, START + 300.0, 5.0)
     shown = np.column_stack([told, np.zeros(len(told)), np.full(len(told), 1e-3), told])
-    corrected = correct(RawStream.of(late, shown), Treatment())
+    corrected = correct(RawStream(late, shown), Treatment())
     assert corrected.error.max() < 0.002
     assert corrected.quality.disordered == 10

@@ -48,7 +48,7 @@ def received():
     came = arrivals(times)
     came[:, 1] = ours(came[:, 1])
     read = np.arange(99.0, 342.0, 0.25) + random.uniform(0.0, 0.05, 972)
-    return RawStream.of(clock(times), shown, came), np.column_stack([ours(read), read]), ours(times)
+    return RawStream(clock(times), shown, came), np.column_stack([ours(read), read]), ours(times)
 
 
 def test_a_slew_of_our_own_clock_leaves_no_error(received):
@@ -78,9 +78,7 @@ def test_a_clock_that_was_not_turned_changes_nothing(received):
     raw, log, _ = received
     steady = np.column_stack([log[:, 1], log[:, 1] * (1.0 - 2e-5) + 7e4])
     plain = correct(raw, Treatment(RATE))
-    beside = correct(
-        RawStream.of(raw.stamps, raw.probes, raw.arrivals, own=steady), Treatment(RATE)
-    )
+    beside = correct(RawStream(raw.stamps, raw.probes, raw.arrivals, own=steady), Treatment(RATE))
     np.testing.assert_array_equal(beside.time, plain.time)
 
 
@@ -89,14 +87,14 @@ def test_streams_of_this_computer_keep_its_clock(received):
     _, log, truth = received
     random = np.random.default_rng(9)
     shown = probe(np.asarray, 100.3, 340.0, random)
-    raw = RawStream.of(truth, shown, own=log)
+    raw = RawStream(truth, shown, own=log)
     assert OwnClock.of(raw) is None
     assert np.abs(correct(raw, Treatment(RATE)).time - truth).max() < 1e-4
 
 
 def test_between_readings_a_knee_is_uncertain_and_no_more_than_that(received):
     raw, log, _ = received
-    clock = OwnClock.of(RawStream.of(raw.stamps, raw.probes, raw.arrivals, own=log))
+    clock = OwnClock.of(RawStream(raw.stamps, raw.probes, raw.arrivals, own=log))
     at = np.linspace(100.0, 340.0, 5001)
     straight = clock.straight(ours(at))
     assert np.abs(straight - straight[0] - (at - at[0])).max() < 1e-4

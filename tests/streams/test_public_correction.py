@@ -91,7 +91,7 @@ def test_two_devices_of_one_computer_agree(seed: int) -> None:
     times = regular(random, 100.0, 100, 200)
     clock = Clock(random)
     raws = [
-        RawStream.of(clock(times), probes(clock, times[0], times[-1], random, way=way, reply=reply))
+        RawStream(clock(times), probes(clock, times[0], times[-1], random, way=way, reply=reply))
         for way, reply in ((5e-5, 0.0), (1.5e-4, 0.002))
     ]
     apart = [
@@ -115,7 +115,7 @@ def test_markers_agree_with_the_samples_beside_them_while_their_clock_is_turned(
     samples = regular(random, 250.0, 120, 160)
     markers = np.sort(random.uniform(1001.0, samples[-1] - 1.0, 400))
     given = [
-        RawStream.of(clock(times), probes(clock, 1000.5, samples[-1], random, congestion=busy))
+        RawStream(clock(times), probes(clock, 1000.5, samples[-1], random, congestion=busy))
         for times in (samples, markers)
     ]
     off = []

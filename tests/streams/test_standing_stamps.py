@@ -82,7 +82,7 @@ def test_stamps_that_stand_for_any_part_of_a_recording_are_named_and_stated(
     stamps[begin : begin + int(share * count)] = stamps[begin]
     raw = replace(drawn.raw, stamps=stamps)
     if not arrivals:
-        raw = RawStream.of(stamps, raw.probes)
+        raw = RawStream(stamps, raw.probes)
     corrected = correct(raw, drawn.treatment)
     assert np.mean(np.abs(corrected.time - drawn.truth) <= corrected.error) >= 0.99
     assert Fault.FROZEN in faults(corrected.quality, 250.0)

@@ -110,7 +110,7 @@ def test_an_irregular_stream_died_when_its_program_answers_no_more() -> None:
     own = raw.probes[raw.probes[:, LOCAL] < 160.0]
     early = int(np.searchsorted(times, 158.0))
     stamps, arrivals = raw.stamps[:early], raw.arrivals[raw.arrivals[:, 0] <= early]
-    dead, alive = (RawStream.of(stamps, probes, arrivals) for probes in (own, raw.probes))
+    dead, alive = (RawStream(stamps, probes, arrivals) for probes in (own, raw.probes))
     beside = replace(alive, own_probes=own)  # another program of its computer answers
     silent = [correct(one, Treatment(), 220.0).quality.silent_s for one in (dead, beside, alive)]
     assert 40.0 < silent[0] < 62.0
@@ -151,7 +151,7 @@ def test_restarts_and_warnings_of_the_recorder_are_told():
         Note(120.0, {"event": "reset", "samples": [10_000, 10_000]}),
         Note(121.0, {"event": "warning", "text": "has no source_id: set one"}),
     )
-    report = judged(recorded(clock=SourceClock(ppm=0.0), notes=notes))
+    report = judged(recorded(clock=SourceClock(ppm=1.0), notes=notes))
     assert [finding.text for finding in report.findings] == [
         "its program was restarted 1 times",
         "has no source_id",

@@ -124,7 +124,7 @@ def received(random, clock, times, rate, *, stamped=None, sent=None, index=None,
     share = how.setdefault("share", random.uniform(*SHARE))
     shown = probes(clock, sent[0] + 0.4, sent[-1] + 0.5, random, **how)
     treatment = more.pop("treatment", Treatment(rate_hz=rate))
-    raw = RawStream.of(clock(stamped), shown, arrivals(sent), index=index)
+    raw = RawStream(clock(stamped), shown, arrivals(sent), index=index)
     return Drawn(raw, times, treatment, hidden_s=way * (1.0 - 2.0 * share), **more)
 
 
@@ -176,7 +176,7 @@ def receivers_clock(random):
     clock.offset = random.choice([-1, 1]) * random.uniform(0.06, 0.5) - 1e-6 * clock.ppm * START
     drawn = received(random, clock, times, 250.0, faults=frozenset({Fault.RECEIVER}), clean=False)
     return Drawn(
-        RawStream.of(times, drawn.raw.probes, drawn.raw.arrivals),
+        RawStream(times, drawn.raw.probes, drawn.raw.arrivals),
         times, drawn.treatment, drawn.faults, clean=False,
     )  # fmt: skip
 
@@ -186,7 +186,7 @@ def foreign_clock(random):
     clock, other = Clock(random), Clock(random)
     drawn = received(random, clock, times, 250.0, faults=frozenset({Fault.FOREIGN}), clean=False)
     return Drawn(
-        RawStream.of(other(times), drawn.raw.probes, drawn.raw.arrivals),
+        RawStream(other(times), drawn.raw.probes, drawn.raw.arrivals),
         times, drawn.treatment, drawn.faults, clean=False,
     )  # fmt: skip
 
@@ -313,7 +313,7 @@ def sleeping(random):
     )
     local = drawn.raw.probes[:, 3]
     awake = (local < at) | (local > at + length + 1.5)
-    raw = RawStream.of(drawn.raw.stamps, drawn.raw.probes[awake], drawn.raw.arrivals)
+    raw = RawStream(drawn.raw.stamps, drawn.raw.probes[awake], drawn.raw.arrivals)
     return replace(drawn, raw=raw)
 
 
@@ -332,7 +332,7 @@ def restarting(random):
     later = second.truth + gap
     n = len(first.truth)
     moved = second.raw.probes + np.array([0.0, gap, 0.0, gap])
-    raw = RawStream.of(
+    raw = RawStream(
         np.r_[first.raw.stamps, second.raw.stamps],
         np.concatenate([first.raw.probes, moved]),
         np.concatenate([first.raw.arrivals, second.raw.arrivals + np.array([n, gap])]),
@@ -362,7 +362,7 @@ def unprobed_minutes(random):
     begin = START + random.uniform(60, 150)
     local = drawn.raw.probes[:, 3]
     kept = (local < begin) | (local > begin + random.uniform(120, 300))
-    raw = RawStream.of(drawn.raw.stamps, drawn.raw.probes[kept], drawn.raw.arrivals)
+    raw = RawStream(drawn.raw.stamps, drawn.raw.probes[kept], drawn.raw.arrivals)
     return replace(drawn, raw=raw, faults=frozenset({Fault.PROBES_MISSING}), clean=False)
 
 
@@ -379,7 +379,7 @@ def coarse(random):
     times = regular(random, 128.0)
     drawn = received(random, clock, times, 128.0, faults=frozenset({Fault.COARSE}), grid_s=1e-3)
     stamps = np.round(drawn.raw.stamps, 3)
-    return replace(drawn, raw=RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals))
+    return replace(drawn, raw=RawStream(stamps, drawn.raw.probes, drawn.raw.arrivals))
 
 
 def noisy(random):

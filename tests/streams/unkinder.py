@@ -95,7 +95,7 @@ def slow_way(random):
 
 def never_probed(random):
     drawn = received(random, Clock(random), regular(random, 250.0), 250.0)
-    raw = RawStream.of(drawn.raw.stamps, None, drawn.raw.arrivals)
+    raw = RawStream(drawn.raw.stamps, arrivals=drawn.raw.arrivals)
     return Drawn(raw, drawn.truth, drawn.treatment, frozenset({Fault.UNPROBED}), clean=False)
 
 
@@ -122,7 +122,7 @@ def few_probes(random):
     drawn = received(random, Clock(random), regular(random, 250.0), 250.0)
     kept = random.random(len(drawn.raw.probes)) < random.uniform(0.2, 0.5)
     kept[[0, -1]] = True
-    raw = RawStream.of(drawn.raw.stamps, drawn.raw.probes[kept], drawn.raw.arrivals)
+    raw = RawStream(drawn.raw.stamps, drawn.raw.probes[kept], drawn.raw.arrivals)
     gap = np.diff(raw.probes[:, 0]).max() / 2.0
     faults = frozenset({Fault.PROBES_MISSING} if gap > 30.0 else ())
     return replace(drawn, raw=raw, faults=faults)
@@ -131,7 +131,7 @@ def few_probes(random):
 def restarting_untold(random):
     """Another process takes its place, and liblsl does not say so."""
     drawn = ROWS["restarts with another clock"](random)
-    raw = RawStream.of(drawn.raw.stamps, drawn.raw.probes, drawn.raw.arrivals)
+    raw = RawStream(drawn.raw.stamps, drawn.raw.probes, drawn.raw.arrivals)
     return Drawn(raw, drawn.truth, drawn.treatment, frozenset({Fault.STEPPED, Fault.INTERRUPTED}))
 
 
@@ -217,8 +217,8 @@ def own_slewed(random, *, logged):
     read = read[np.r_[True, np.diff(read) > 0.05]]
     crystal = random.uniform(-3e-5, 3e-5)
     seen = read + random.exponential(2e-7, len(read))
-    log = np.column_stack([ours(read), 3e5 + seen * (1 + crystal)]) if logged else None
-    raw = RawStream.of(given.stamps, shown, came, own=log)
+    log = np.column_stack([ours(read), 3e5 + seen * (1 + crystal)])
+    raw = RawStream(given.stamps, shown, came, own=log if logged else log[:0])
     return replace(drawn, raw=raw, truth=ours(drawn.truth), faults=frozenset({Fault.SLEWED}))
 
 
@@ -294,7 +294,7 @@ def receivers_nearby(random):
     clock.offset = random.choice([-1, 1]) * a_little_off(random, 4e-3, 0.4)
     clock.offset -= 1e-6 * clock.ppm * START
     drawn = received(random, clock, times, rate, faults=frozenset({Fault.RECEIVER}), clean=False)
-    return replace(drawn, raw=RawStream.of(times, drawn.raw.probes, drawn.raw.arrivals))
+    return replace(drawn, raw=RawStream(times, drawn.raw.probes, drawn.raw.arrivals))
 
 
 def paused(random):
@@ -331,7 +331,7 @@ def foreign_nearby(random, *, side):
     times, rate = announced(random)
     off = a_little_off(random, 4e-3, 0.4)
     drawn = received(random, Clock(random), times, rate, clean=False)
-    raw = RawStream.of(drawn.raw.stamps + side * off, drawn.raw.probes, drawn.raw.arrivals)
+    raw = RawStream(drawn.raw.stamps + side * off, drawn.raw.probes, drawn.raw.arrivals)
     if side > 0:
         # Markers that are stamped ahead of their push look alike, while it is by little.
         both = frozenset({Fault.FOREIGN, Fault.AHEAD} if not rate and off < AHEAD_S else ())
@@ -354,7 +354,7 @@ def foreign_drifting(random):
     foreign = frozenset({Fault.FOREIGN})
     fault = foreign if rate and ppm > 0.0 else frozenset()
     either = frozenset() if rate or ppm < 0.0 else foreign | {Fault.AHEAD}
-    raw = RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals)
+    raw = RawStream(stamps, drawn.raw.probes, drawn.raw.arrivals)
     return replace(drawn, raw=raw, faults=fault, perhaps=either)
 
 
@@ -365,7 +365,7 @@ def frozen(random):
     for at in random.integers(500, len(stamps) - 500, int(random.integers(3, 20))):
         stop = at + int(random.integers(5, 200))
         stamps[at:stop] = stamps[at]
-    raw = RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals)
+    raw = RawStream(stamps, drawn.raw.probes, drawn.raw.arrivals)
     return replace(drawn, raw=raw, faults=frozenset({Fault.FROZEN}), clean=False)
 
 
@@ -380,7 +380,7 @@ def cut(random):
     stamps = np.floor((drawn.raw.stamps - since) / grid) * grid + since
     # Of some samples within one unit the stamps stand still.
     perhaps = frozenset({Fault.FROZEN, Fault.LATE_STAMPS, Fault.SLOW})
-    raw = RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals)
+    raw = RawStream(stamps, drawn.raw.probes, drawn.raw.arrivals)
     return replace(drawn, raw=raw, grid_s=grid, perhaps=perhaps, chance=True)
 
 
@@ -401,7 +401,7 @@ def camera(random):
     if random.random() < 0.5:
         return drawn
     stamps = np.floor(drawn.raw.stamps * 1e3) / 1e3
-    raw = RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals)
+    raw = RawStream(stamps, drawn.raw.probes, drawn.raw.arrivals)
     coarse = frozenset({Fault.COARSE})
     return replace(drawn, raw=raw, faults=coarse, clean=False, grid_s=1e-3)
 
@@ -412,7 +412,7 @@ def just_behind(random):
     drawn = received(random, Clock(random), times, rate, clean=False)
     off = random.uniform(5e-5, 1e-3)
     return replace(
-        drawn, raw=RawStream.of(drawn.raw.stamps - off, drawn.raw.probes, drawn.raw.arrivals)
+        drawn, raw=RawStream(drawn.raw.stamps - off, drawn.raw.probes, drawn.raw.arrivals)
     )
 
 

@@ -194,25 +194,6 @@ def _hold_frozen(stamps: FloatArray, time: FloatArray, error: FloatArray) -> tup
     return int(more.sum()), int(more[more >= LONG_STAND - 1].sum())
 
 
-def _placed(
-    known: tuple[RawStream, FloatArray | None, list[Epoch]],
-    curves: list[OffsetCurve | None],
-    least: float,
-    whose: str,
-    *,
-    regular: bool,
-) -> tuple[FloatArray, FloatArray, tuple[ClockSegment, ...]]:
-    """Return times, errors and segments, where it is known whose clock the stamps are of."""
-    raw, arrival, stretches = known
-    if whose:
-        least, curves = 0.0, [None] * len(stretches)
-    time, error = np.full((2, len(raw.stamps)), np.nan)
-    pieces = _pieces(raw, arrival, stretches, curves, (least, time, error, whose), regular=regular)
-    arrived = arrival is not None
-    segments = tuple(_segment(*piece, known=arrived) for piece in _joined(pieces))
-    return time, error, segments
-
-
 def _curves(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> list[OffsetCurve | None]:
     """Return each clock's curve, the longest known first: it lends its slope to brief ones."""
     curves: list[OffsetCurve | None] = [None] * len(stretches)
@@ -404,17 +385,19 @@ def _scatter(time: FloatArray) -> float:
     return float(1.4826 * np.median(np.abs(steps - np.median(steps))) / np.sqrt(2.0))
 
 
-def _pieces(
-    raw: RawStream,
-    arrival: FloatArray | None,
-    stretches: list[Epoch],
+def _placed(
+    known: tuple[RawStream, FloatArray | None, list[Epoch]],
     curves: list[OffsetCurve | None],
-    into: tuple[float, FloatArray, FloatArray, str],
+    least: float,
+    whose: str,
     *,
     regular: bool,
-) -> list[_Piece]:
-    """Write times and errors of each piece between leaps; return the pieces and their clocks."""
-    least, time, error, whose = into
+) -> tuple[FloatArray, FloatArray, tuple[ClockSegment, ...]]:
+    """Return times, errors and segments, where it is known whose clock the stamps are of."""
+    raw, arrival, stretches = known
+    if whose:
+        least, curves = 0.0, [None] * len(stretches)
+    time, error = np.full((2, len(raw.stamps)), np.nan)
     found: list[_Piece] = []
     for k, epoch in enumerate(stretches):
         for start, stop in _ranges(raw.stamps, arrival, epoch, regular=regular):
@@ -431,20 +414,12 @@ def _pieces(
                 time[part], error[part] = stamps, _spread(stamps, arrival[part])
             elif arrival is not None:
                 time[part], error[part] = _by_arrival(stamps, arrival[part], least)
-            found.append((start, stop, epoch, chosen))
-    return found
-
-
-def _joined(pieces: list[_Piece]) -> list[_Piece]:
-    """Return the pieces with those of one clock put together."""
-    joined: list[_Piece] = []
-    for start, stop, epoch, curve in pieces:
-        if joined and curve is not None and joined[-1][3] is curve:
-            first, _, whose, _ = joined.pop()
-            joined.append((first, stop, whose, curve))
-        else:
-            joined.append((start, stop, epoch, curve))
-    return joined
+            if found and chosen is not None and found[-1][3] is chosen:  # of the same clock
+                first, _, before, _ = found.pop()
+                found.append((first, stop, before, chosen))
+            else:
+                found.append((start, stop, epoch, chosen))
+    return time, error, tuple(_segment(*each, known=arrival is not None) for each in found)
 
 
 def _candidates(curves: list[OffsetCurve | None], k: int) -> list[OffsetCurve]:

@@ -57,9 +57,9 @@ class RawStream:
     """
 
     stamps: FloatArray
-    probes: FloatArray
-    arrivals: FloatArray
-    resets: FloatArray
+    probes: FloatArray = field(default_factory=lambda: _nothing(4))
+    arrivals: FloatArray = field(default_factory=lambda: _nothing(2))
+    resets: FloatArray = field(default_factory=lambda: _nothing(3))
     index: FloatArray | None = None
     own: FloatArray = field(default_factory=lambda: _nothing(2))
     steady: FloatArray = field(default_factory=lambda: np.empty(0))
@@ -71,26 +71,6 @@ class RawStream:
             shape = getattr(self, name).shape
             if len(shape) != 2 or shape[1] != columns:  # noqa: PLR2004
                 raise RecordingError(f"{name} must have the shape (n, {columns}), but have {shape}")
-
-    @classmethod
-    def of(
-        cls,
-        stamps: FloatArray,
-        probes: FloatArray | None = None,
-        arrivals: FloatArray | None = None,
-        resets: FloatArray | None = None,
-        index: FloatArray | None = None,
-        own: FloatArray | None = None,
-    ) -> "RawStream":
-        """Return a stream of which some things may not be known."""
-        return cls(
-            np.asarray(stamps, dtype=np.float64),
-            _nothing(4) if probes is None else probes,
-            _nothing(2) if arrivals is None else arrivals,
-            _nothing(3) if resets is None else resets,
-            index,
-            _nothing(2) if own is None else own,
-        )
 
     def arrival(self) -> FloatArray | None:
         """Return our time when each sample arrived, shape ``(n,)``; None when that is not known."""
@@ -143,7 +123,7 @@ def raw_of(recorded: RecordedStream) -> RawStream:
         when, offset = recorded.offsets.T
         trips = np.full(len(when), ASSUMED_RTT_S)
         probes = np.column_stack([when - POLL_AGE_S, offset, trips, when + offset])
-    raw = RawStream.of(
+    raw = RawStream(
         recorded.time_raw,
         probes=probes,
         arrivals=recorded.arrivals,

@@ -111,7 +111,10 @@ def carries(quality: Quality) -> str:
 
 
 def corrections(quality: Quality) -> list[str]:
-    """Return how well times are known, and what was done to the stamps, one sentence each."""
+    """Return how well times are known, and how they were mapped, one sentence each.
+
+    What happened to a clock, and that it was corrected, its findings say.
+    """
     done = []
     if quality.made_of_s:
         done.append(f"uncertain by {in_words(quality.error_p95_s, quality.made_of_s)}")
@@ -119,22 +122,6 @@ def corrections(quality: Quality) -> list[str]:
         done.append(f"declared, not measured: stamped {quality.stamped.replace('_', ' ')}")
     if np.isfinite(quality.drift_ppm):
         done.append(f"mapped from a clock that runs {quality.drift_ppm:+.1f} ppm off")
-    for count, what in (
-        (quality.steps, "steps of its clock"),
-        (quality.restarts, "restarts of its program"),
-        (quality.sleeps, "sleeps of its computer"),
-        (quality.slews, "slews of a clock"),
-        (quality.own_slews, "slews of this computer's own clock"),
-    ):
-        if count:
-            done.append(f"{count} {what} followed")
-    if quality.stalls:
-        done.append(
-            f"{quality.stalls} times samples came up to {quality.longest_stall_s:.1f} s late and "
-            "kept their own times"
-        )
-    if quality.disordered:
-        done.append(f"{quality.disordered} samples came out of order and kept their own times")
     if quality.moved_max_s > 0.0:
         done.append(
             f"dejittering moved 95 % of samples by less than {1e3 * quality.moved_p95_s:.3f} ms, "
