@@ -610,3 +610,21 @@ def test_few_samples_declared_to_be_stamped_when_sent_may_have_waited(count: int
         clock(t[:1]), probes=clock.probes(random, 20.0), rate_hz=50.0, stamped="when_sent"
     )
     assert np.isnan(one.error).all()
+
+
+@pytest.mark.parametrize("stamped", ["", "at_sampling"])
+@pytest.mark.parametrize("rate", [1000.0, 500.0, 250.0])
+@pytest.mark.parametrize("ppm", [0.5, 3.0, 18.0, 25.0])
+def test_whole_milliseconds_of_a_count_that_hardly_slips_leave_one_open(
+    ppm: float, rate: float, stamped: str
+) -> None:
+    """They looked exact, and were up to a millisecond off where 0.1 stood."""
+    for seed in range(3):
+        random = np.random.default_rng([10, int(10 * ppm), int(rate), seed])
+        t = 1.0 + np.arange(int(60.0 * rate)) / rate * (1.0 + 1e-6 * ppm) + random.uniform()
+        clock = Remote(float(random.integers(1, 5000)), 0.0)
+        cut = np.floor(1e3 * clock(t)) / 1e3
+        given = {"probes": clock.probes(random, t[-1]), "rate_hz": rate, "stamped": stamped}
+        corrected = correct(cut, **given)
+        assert (np.abs(corrected.time - t) <= corrected.error).all()
+        assert corrected.quality.grid_s == pytest.approx(1e-3)

@@ -278,7 +278,9 @@ def examine(
         found = _steps(time[order], counts, grid, counted=counter is not None)
     else:
         found = _steps(time, index, grid, counted=counter is not None)
-    grid = 0.0 if _on_grid(found, stamps[order], grid) else grid
+    slips = _slips(found, stamps[order], grid)
+    if slips < SEVERAL and not units.are_milliseconds(stamps):
+        grid = 0.0  # nothing was cut
     shifted = found.exact and len(found.shifted.at) > 0
     lost, blurred = None, False
     explained = found.computed and not found.missing and not found.clumped
@@ -314,7 +316,9 @@ def examine(
                 chunk_s=found.chunk_s,
                 wander_s=found.moves(stamps, waited.period, index).open_s,
             )
-    noise, late, by_grid, uneven = _noise(time, arrival, found, grid, late=late)
+    # Where few slip, no count shows where in their units samples were taken.
+    shown = grid if slips >= FEW else 0.0
+    noise, late, by_grid, uneven = _noise(time, arrival, found, shown, late=late)
     rates = _rates(found)
     steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
     moves = None
@@ -664,18 +668,16 @@ def coarse_unit(stamps: FloatArray, *, regular: bool) -> float:
         return units.tick(stamps, unit, 0.0)
     period = _typical(np.sort(stamps), np.arange(float(len(stamps))))
     if abs(unit - period) < RATE_CHANGE * period:  # all steps are of one sample, or of some
-        return 0.0
+        return units.MILLISECOND if units.are_milliseconds(stamps) else 0.0
     return units.tick(stamps, unit, period)
 
 
-def _on_grid(found: _Steps, stamps: FloatArray, grid: float) -> bool:
-    """Whether whole periods are whole units of the grid all along, so that nothing was cut."""
+def _slips(found: _Steps, stamps: FloatArray, grid: float) -> int:
+    """Return how often stamps are other whole units of a grid apart than their periods are."""
     if not grid:
-        return True
-    part = found.period / grid
-    slips = np.round((stamps - stamps[0]) / grid - round(part) * (found.index - found.index[0]))
-    whole = abs(part - round(part)) < 1e-4  # noqa: PLR2004
-    return bool(whole and np.count_nonzero(np.diff(slips)) < SEVERAL)
+        return 0
+    parts = np.diff(np.round((stamps - stamps[0]) / grid))
+    return int(np.count_nonzero(parts != round(found.period / grid) * np.diff(found.index)))
 
 
 def _stalls(

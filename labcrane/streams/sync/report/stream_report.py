@@ -118,11 +118,9 @@ def uncorrected_stream(recorded: RecordedStream, why: str) -> StreamReport:
         header.rate_hz,
         quality,
         (finding, *_findings(_noted(recorded))),
-        (),
-        (),
-        unknowable(quality),
-        carries(quality),
-        _taken(recorded),
+        unknown=unknowable(quality),
+        carries=carries(quality),
+        taken=_taken(recorded),
     )
 
 
@@ -267,7 +265,7 @@ def _scatter(quality: Quality, limits: Limits) -> _Judged:
     """Judge how far stamps lie beside an even count."""
     if quality.grid_s:
         unit = f"{1e3 * quality.grid_s:g} ms"
-        text = f"its timestamps are cut to {unit}; their uncertainty includes half of that"
+        text = f"its timestamps are cut to {unit}; their uncertainty includes half of that, or all"
         yield Verdict.WARN, text, "let its program stamp with LSL's clock at full resolution"
     if quality.contradicted:
         text = f"its timestamps are {quality.contradicted}, though it is declared to be stamped "

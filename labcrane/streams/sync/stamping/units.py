@@ -8,6 +8,7 @@ import numpy as np
 
 from labcrane.types import FloatArray
 
+MILLISECOND = 1e-3
 DECIMAL_S = (1.0, 0.1)
 LEAST_S, MOST_S = 5e-5, 0.04
 """Finer units are reported unchanged; no timer ticks in coarser ones."""
@@ -45,6 +46,12 @@ def find(stamps: FloatArray) -> float:
             if LEAST_S <= unit <= MOST_S:
                 return unit
     return 0.0
+
+
+def are_milliseconds(stamps: FloatArray) -> bool:
+    """Return whether each is a whole number of them: then that is what their clock counts in."""
+    blur = float(np.spacing(np.abs(stamps).max(initial=1.0)))
+    return bool(_rest(stamps / MILLISECOND).max() < WHOLE + blur / MILLISECOND)
 
 
 def tick(stamps: FloatArray, unit: float, period: float) -> float:
