@@ -16,13 +16,11 @@ from cranes import (
     engines,
     machines,
     needs_bullet,
-    needs_mujoco,
     random_poses,
     random_sticks,
     rates,
     standing,
 )
-from rehearsal import SHORT, a_study, rehearse
 
 from labcrane import FloatArray, Machine
 from labcrane.machines import ACTUATOR_PRESETS, Arm, link_frames
@@ -98,22 +96,6 @@ def test_an_engine_follows_the_velocity_law(
             paths.append(drive(crane, commands, rate_hz))
     assert np.ptp(paths[1][:, :4], axis=0).min() > np.radians(1), "every joint moves"
     np.testing.assert_allclose(paths[0][:, :14], paths[1], rtol=0, atol=1e-9)
-
-
-@needs_bullet
-@needs_mujoco
-@machines
-@rates
-def test_both_engines_put_the_joints_in_the_same_place(model: str, rate_hz: float) -> None:
-    """Tolerance 1e-12: without a load, and as long as the motors suffice."""
-    machine = load_machine(model)
-    commands = random_sticks(machine, rate_hz, 20.0, seed=12)
-    paths = []
-    for name in ("bullet_crane", "mujoco_crane"):
-        with standing(name, machine, rate_hz) as crane:
-            paths.append(drive(crane, commands, rate_hz)[:, :4])
-    assert np.ptp(paths[1], axis=0).min() > np.radians(1), "every joint moves"
-    np.testing.assert_allclose(paths[0], paths[1], rtol=0, atol=1e-12)
 
 
 @engines
@@ -276,24 +258,3 @@ def test_torques_worked_out_before_the_step_change_its_time_only(
             paths.append(drive(crane, commands, rate_hz))
     assert all(passes) == (share < 1.0), "either kind of tick is tried"
     np.testing.assert_allclose(paths[0][:, :8], paths[1][:, :8], rtol=0, atol=1e-6)
-
-
-@pytest.mark.slow
-@needs_bullet
-def test_a_simulated_operator_who_aims_asks_no_motor_for_too_much(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Every tick that did would cost the solver's time."""
-    from labcrane_bullet.bullet_crane import BulletCrane
-
-    work_out, enough = BulletCrane._enough, []
-
-    def count(crane: BulletCrane, speeds: list[float]) -> Sequence[float] | None:
-        torques = work_out(crane, speeds)
-        enough.append(torques is not None)
-        return torques
-
-    monkeypatch.setattr(BulletCrane, "_enough", count)
-    rehearse(a_study(tmp_path, SHORT.replace("kinematic_crane", "bullet_crane")))
-    assert len(enough) > 1000
-    assert all(enough)

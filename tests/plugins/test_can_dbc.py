@@ -148,17 +148,6 @@ def test_a_signal_on_one_side_of_rest_is_refused_with_both_keys(
     )
 
 
-def test_a_check_refuses_a_lever_that_asks_for_half_flow_at_rest(panel: Path) -> None:
-    panel.write_text(UNSIGNED, encoding="utf-8")
-    shutil.copytree(PROTOCOLS / "retrieval", panel.parent, dirs_exist_ok=True)
-    path = panel.parent / "protocol.yaml"
-    text = path.read_text(encoding="utf-8")
-    valves = "{base: Levers.Boom, arm: Levers.Arm}, map: panel.dbc"
-    path.write_text(text.replace("{base: 1, arm: 2, boom: 3, jaws: 4}", valves), encoding="utf-8")
-    with pytest.raises(ProtocolError, match=r"Levers.Boom is 0 to 100 in .*, never on both"):
-        load(path, discover())
-
-
 def test_full_flow_is_above_rest() -> None:
     with pytest.raises(ValueError, match="full is 100 and neutral 100; full flow is a greater"):
         ValveMap(valves={"elbow": 1}, neutral=100.0)

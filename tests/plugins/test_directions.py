@@ -12,7 +12,7 @@ from shutil import copytree
 
 import numpy as np
 import pytest
-from cranes import needs_bullet, needs_mujoco
+from cranes import needs_mujoco
 from scheme_setups import LOW, MACHINES, STICKS, end_effector, joint_velocity, push, ready
 
 from labcrane.core.signals import Signal
@@ -131,14 +131,6 @@ def test_the_tip_goes_where_the_stick_points(study: str) -> None:
         assert way * (after[2] - before[2]) > 0.05, "a pull lifts"
         before, after = moved(path, left_y=way)
         assert way * (np.linalg.norm(before[:2]) - np.linalg.norm(after[:2])) > 0.02, "draws in"
-
-
-@needs_bullet
-def test_the_arm_of_the_scenarios_turns_the_way_the_stick_says() -> None:
-    path = ROOT / "protocols" / "retrieval" / "joysticks.yaml"
-    for way in (1.0, -1.0):
-        before, after = moved(path, left_x=way)
-        assert way * (before[1] - after[1]) > 0.02, "y is to the left of who looks along x"
 
 
 MOVES = {

@@ -200,15 +200,6 @@ def test_a_signal_beyond_full_flow_is_refused(model) -> None:
 
 
 @pytest.mark.slow
-def test_errors_per_level_keep_their_order(model, recordings) -> None:
-    for between in ("linear", "pchip"):
-        for level in validate(model.interpolated(between), recordings):
-            row = level.row()
-            assert row["mse"] == pytest.approx(row["rmse"] ** 2)
-            assert row["mae"] <= row["rmse"] + 1e-12 <= row["max_abs_error"] + 2e-12
-
-
-@pytest.mark.slow
 def test_another_machines_law_is_found_in_its_recordings(tmp_path: Path) -> None:
     record(tmp_path / "stick.csv.gz")
     (stick,) = read_recordings(tmp_path)
@@ -397,19 +388,3 @@ def test_grids_that_make_no_sense_are_refused_in_words(
 ) -> None:
     assert main(["dmd", "fit", str(FOLDER), "--out", str(tmp_path / "arm.yaml"), *words]) == 2
     assert refused in capsys.readouterr().err
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("words", "refused"),
-    [
-        (("plot", "{model}", "--out", "{gone}/arm.png"), "arm.png cannot be written: No such file"),
-        (("validate", "{model}", "{folder}", "--out", "{model}"), "cannot be written: File exists"),
-    ],
-)
-def test_commands_say_where_else_their_files_can_go(words, refused, tmp_path, capsys) -> None:
-    places = {"model": FOLDER.parent / "arm.dmd.yaml", "gone": tmp_path / "gone", "folder": FOLDER}
-    assert main(["dmd", *(word.format(**places) for word in words)]) == 1
-    said = capsys.readouterr().err
-    assert refused in said
-    assert "give --out another place" in said

@@ -1,9 +1,5 @@
-"""Panel, joysticks and keyboard: each drives the arm of the scenarios by its own protocol.
+"""Panel, joysticks and keyboard: each drives the arm of the scenarios by its own protocol."""
 
-Each also has the button with which a deformity is reported.
-"""
-
-import math
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -12,7 +8,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import can
-import numpy as np
 import pylsl
 import pytest
 from cranes import needs_bullet
@@ -21,13 +16,12 @@ from ruamel.yaml import YAML
 from virtual_sticks import desk
 
 from labcrane.cli.app import main
-from labcrane.core import PlannedTrial
 from labcrane.core.clock import Tick
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import discover
-from labcrane.testing import make_frame, make_trial
-from labcrane_can.avc import State, encode
+from labcrane.testing import make_frame
+from labcrane_can.avc import encode
 
 RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
 JOINTS = ("base", "arm", "boom", "jaws")
@@ -44,15 +38,12 @@ class Controls(NamedTuple):
         With these controls.
     push
         Moves one joint's control all the way, towards 1 or -1; 0 lets it go.
-    report
-        Presses the button for a deformity that is seen, or lets it go.
     wait_s
         How long what is done takes to arrive.
     """
 
     study: Study
     push: Callable[[str, int], None]
-    report: Callable[[bool], None]
     wait_s: float
 
 
@@ -79,20 +70,13 @@ def panel(study: Study) -> Iterator[Controls]:
     held = dict.fromkeys(JOINTS, 0)
     with can.Bus(interface="virtual", channel="retrieval") as bus:
 
-        def say(floats: str = "") -> None:
-            for valve, name in enumerate(JOINTS, start=1):
-                state = State.FLOAT if name == floats else None
-                identifier, data = encode(valve, 250 * held[name], 0x25, state)
-                bus.send(can.Message(arbitration_id=identifier, data=data))
-
         def push(joint: str, way: int) -> None:
             held[joint] = way
-            say()
+            for valve, name in enumerate(JOINTS, start=1):
+                identifier, data = encode(valve, 250 * held[name], 0x25)
+                bus.send(can.Message(arbitration_id=identifier, data=data))
 
-        def report(down: bool) -> None:  # noqa: FBT001 - reads as what is done
-            say("base" if down else "")
-
-        yield Controls(study, push, report, 0.05)
+        yield Controls(study, push, 0.05)
 
 
 STICKS = {"base": (0, 0, -1), "arm": (0, 1, -1), "boom": (1, 1, -1), "jaws": (1, 0, 1)}
@@ -108,10 +92,7 @@ def joysticks(study: Study) -> Iterator[Controls]:
             stick, axis, sign = STICKS[joint]
             plugged[stick].move(axis, 32767 * sign * way)
 
-        def report(down: bool) -> None:  # noqa: FBT001 - reads as what is done
-            plugged[0].press(down=down)
-
-        yield Controls(study, push, report, 0.0)
+        yield Controls(study, push, 0.0)
 
 
 @contextmanager
@@ -136,10 +117,7 @@ def keyboard(study: Study) -> Iterator[Controls]:
     def push(joint: str, way: int) -> None:
         hold(*[axes[joint][(1 + way) // 2]] * (way != 0))
 
-    def report(down: bool) -> None:  # noqa: FBT001 - reads as what is done
-        hold(*["f"] * down)
-
-    yield Controls(study, push, report, 0.05)
+    yield Controls(study, push, 0.05)
 
 
 EACH = pytest.mark.parametrize(
@@ -153,7 +131,7 @@ EACH = pytest.mark.parametrize(
 def test_each_control_moves_each_joint_both_ways_and_stops_it(controls) -> None:
     name = "protocol" if controls is panel else controls.__name__
     study = load(RETRIEVAL / f"{name}.yaml", discover())
-    with controls(study) as (changed, push, _, wait_s):
+    with controls(study) as (changed, push, wait_s):
         rig = Rig.build(changed, simulated=False)
         with rig.opened(changed, 1) as run:
             state = rig.dynamics.state()
@@ -193,56 +171,6 @@ def test_each_control_moves_each_joint_both_ways_and_stops_it(controls) -> None:
                 still = float(state[angles][JOINTS.index(joint)])
                 drive(0.5, joint, 0)
                 assert float(state[angles][JOINTS.index(joint)]) == pytest.approx(still, abs=1e-3)
-
-
-@needs_bullet
-@EACH
-def test_each_control_has_a_button_with_which_a_deformity_is_reported(controls) -> None:
-    name = "protocol" if controls is panel else controls.__name__
-    study = load(RETRIEVAL / f"{name}.yaml", discover())
-    trial = make_trial(PlannedTrial({"scenario": "casualty"}, expected_s=1.0))
-    with controls(study) as (changed, push, report, _):
-        rig = Rig.build(changed, simulated=False)
-        with rig.opened(changed, 1) as run:
-            for component in (*rig.components, task := rig.tasks["retrieval"]):
-                component.begin_trial(trial)
-            # Over the legs: from the pose of the start nothing is found.
-            rig.dynamics.reset([math.radians(angle) for angle in (-117.9, 28.2, -13.7, 30)])
-            state, number = rig.dynamics.state(), 0
-
-            def there() -> bool:
-                push("base", 0)  # panels and views say again what is held
-                now = time.perf_counter()
-                rig.input.read(Tick(1, now, now), make_frame(run, 1, state))
-                return rig.input.fault is None
-
-            def told() -> list[tuple[str, str]]:
-                """Read the controls for a tick, and return what the task was told by it."""
-                nonlocal number
-                number += 1
-                now = time.perf_counter()
-                frame = make_frame(run, number, state)
-                frame.axes = np.array(rig.input.read(Tick(number, now, now), frame))
-                events = task.evaluate(frame).events
-                found = [event.data for event in events if event.name == "deformity.found"]
-                return [(each["by"], each["limb"]) for each in found]
-
-            wait_for(there)
-            for _ in range(20):
-                report(False)  # noqa: FBT003
-                push("arm", 1)
-                assert told() == [], "nobody pressed the button"
-            found = []
-
-            def reported() -> bool:
-                report(True)  # noqa: FBT003
-                found.extend(told())
-                return bool(found)
-
-            wait_for(reported)
-            ((by, limb),) = found
-            assert by == "operator"
-            assert limb in {"left_forearm", "left_shank", "right_shank"}
 
 
 @pytest.mark.long

@@ -111,13 +111,8 @@ def test_five_mistakes_of_a_kind_end_the_run_and_four_do_not(tmp_path: Path) -> 
     seen = judged(tmp_path, PUSH * 6)
     assert seen[-1].phase is Phase.FAILURE
     events = [event for judgement in seen for event in judgement.events]
-    assert [event.data["count"] for event in events if event.name == "contact.object"] == [
-        1,
-        2,
-        3,
-        4,
-        5,
-    ]
+    counts = [event.data["count"] for event in events if event.name == "contact.object"]
+    assert counts == [1, 2, 3, 4, 5]
     assert events[-1].name == "mistakes.too_many"
     assert seen[-1].results["k"] == 0.0
     assert seen[-1].results["n_object"] == 5.0
@@ -203,10 +198,6 @@ def test_a_goal_of_which_the_state_says_nothing_is_refused_before_the_session(
     [
         (("0.1], mass", "0.02], mass"), r"block.yaml:4:\d+: 'block' is 0.080 m deep in the ground"),
         (
-            ("shape: box", "shape: bix"),
-            r"block.yaml:4:\d+: things.block.shape is 'bix'; it must be",
-        ),
-        (
             ("radius: 0.1}", "radius: 0.1, what: blok}"),
             r"block.yaml:5:\d+: there is no 'blok' in this",
         ),
@@ -214,7 +205,6 @@ def test_a_goal_of_which_the_state_says_nothing_is_refused_before_the_session(
             ("radius: 0.1}", "radius: 0.1, touch: blok}"),
             r"block.yaml:5:\d+: there is no 'blok' in this",
         ),
-        (("mass_kg: 20", "mass_kg: -1"), r"things.block.mass_kg is -1; it must be greater than 0"),
         (
             ("goals:", "figure: {position: [1, 0, 0.01]}\ngoals:"),
             r"the figure's chest is 0.01 m high, which is in the ground; 0.11 m or more",
@@ -349,12 +339,7 @@ def test_a_deformity_is_found_by_a_button_of_control_or_page_or_the_supervisors_
         values[run.state.index("tip.position.x")] = 1.6 + ahead
         values[run.state.index("scene.figure.position.x")] = 1.6
         half = math.radians(turn) / 2.0
-        values[run.state.find("scene.figure.orientation")] = (
-            0.0,
-            0.0,
-            math.sin(half),
-            math.cos(half),
-        )
+        values[run.state.find("scene.figure.orientation")] = (0, 0, math.sin(half), math.cos(half))
         frame = make_frame(run, number, values)
         frame.axes = np.array([button])
         if number in orders:

@@ -2,18 +2,16 @@
 
 import math
 import random
-import shutil
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from needs import needs
 from pydantic import ValidationError
-from tactor_board import SKETCH, serial_board, udp_board
+from tactor_board import serial_board, udp_board
 from virtual_sticks import desk
 
 from labcrane import DeviceError, Feedback, Frame, Run
@@ -193,10 +191,6 @@ def test_a_preview_is_a_picture(run: Run, tmp_path: Path) -> None:
     assert file.read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_sketch_has_at_most_sixty_lines() -> None:
-    assert len(SKETCH.read_text().splitlines()) <= 60
-
-
 BOARDS = [(serial_board, "port", "serial"), (udp_board, "address", "udp")]
 
 
@@ -363,34 +357,3 @@ def test_the_example_gives_the_same_by_every_sense(capsys: pytest.CaptureFixture
     said = capsys.readouterr()
     assert "study 'touch' is fine" in said.out
     assert "warning" not in said.out + said.err
-
-
-def test_check_asks_about_a_touch_that_tells_more_than_the_sphere(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    shutil.copytree(EXAMPLE, tmp_path / "study")
-    protocol = tmp_path / "study" / "protocol.yaml"
-    text = protocol.read_text()
-    more = "port: /dev/ttyACM0, tactors: {left: 90, right: -90, front: 0},"
-    protocol.write_text(text.replace("port: /dev/ttyACM0,", more))
-    assert main(["check", str(protocol)]) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert "conditions 'sphere' and 'touch' do not give the same information" in said
-    assert (
-        "in 'touch' alone people learn on which side the target is and whether the target is "
-        "ahead or behind" in said
-    )
-
-
-@pytest.mark.slow
-def test_the_report_of_the_example_tests_the_four_forms(tmp_path: Path) -> None:
-    data, study, report = (tmp_path / name for name in ("data", "study", "report"))
-    shutil.copytree(EXAMPLE, study)
-    text = (study / "protocol.yaml").read_text()
-    (study / "protocol.yaml").write_text(text.replace("distances: [1, 2]", "distances: [1]"))
-    assert main(["simulate", str(study), "--participants", "4", "--out", str(data)]) == 0
-    assert main(["report", str(data), "--include", "simulated", "--out", str(report)]) == 0
-    contrasts = pd.read_csv(report / "tables" / "contrasts.csv")
-    of_condition = contrasts[contrasts["factor"] == "condition"]
-    forms = {*of_condition["first"], *of_condition["second"]}
-    assert forms == {"sphere", "tone", "touch", "all"}

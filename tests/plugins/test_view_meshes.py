@@ -1,6 +1,5 @@
 """Meshes and scenes in the view: read alike from every format, drawn where they are."""
 
-import math
 import struct
 from dataclasses import replace
 from pathlib import Path
@@ -11,15 +10,13 @@ from needs import GRAPHICS, needs
 from rehearsal import SHORT, a_study
 from windows import MACHINE, POSE, make_frame, projected
 
-from labcrane import DeviceError, Frame, Machine, ProtocolError, Signal
+from labcrane import DeviceError, Machine, ProtocolError
 from labcrane.approval.materials import referred
-from labcrane.core import SessionState
-from labcrane.machines import MeshFile, link_boxes, link_frames, read_placed, urdf_of, write_placed
-from labcrane.machines.scene import load_scene, place_objects
+from labcrane.machines import MeshFile, link_boxes, link_frames, urdf_of
 from labcrane.recording.run_codec import read_run, write_run
-from labcrane.testing import TARGETS, crane_state, make_run
+from labcrane.testing import TARGETS, make_run
 from labcrane_view.scene.mesh_reader import read_mesh
-from labcrane_view.settings import CameraSettings, ViewSettings
+from labcrane_view.settings import ViewSettings
 from labcrane_view.view import View
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
@@ -207,55 +204,3 @@ figure: {position: [4.0, -1.2, 0.13], yaw_deg: 40}
 goals: [{position: [5, 0, 1], radius: 0.2}]
 """
 CAMERA = {"name": "c", "eye": (0.5, 0.0, 2.5), "look": (5.0, 0.0, 0.5)}
-
-
-def a_scene_file(folder: Path) -> Path:
-    written(folder, "a.stl")
-    path = folder / "scene.yaml"
-    path.write_text(SCENE, encoding="utf-8")
-    return path
-
-
-@needs(*GRAPHICS)
-def test_a_scene_is_drawn_where_its_things_stand_and_are_moved(tmp_path: Path) -> None:
-    things = place_objects(load_scene(a_scene_file(tmp_path)), 1)
-    assert read_placed(write_placed(things)) == things
-    crate = Signal("scene.crate.position", "m", ("x", "y", "z"))
-    turn = Signal("scene.crate.orientation", "1", ("x", "y", "z", "w"))
-    state = (*crane_state(MACHINE).signals, crate, turn)
-    run = replace(make_run(MACHINE, task=TARGETS, state=state), bodies=link_boxes(MACHINE))
-
-    def at(*where: float) -> Frame:
-        frame = make_frame()
-        quarter = math.sqrt(0.5)  # turned to the left by a quarter
-        frame.state = np.array([*frame.state, *where, 0.0, 0.0, quarter, quarter])
-        return frame
-
-    settings = {"display": "hidden", "size": (640, 360), "camera": CAMERA, "hud": ()}
-    view = View(ViewSettings(**settings, areas=("crate", "wall", "post")), MACHINE)
-    view.open(run)
-    try:
-        view.present(at(5.0, 0.0, 1.0))
-        view.present(at(5.0, 0.0, 1.0))  # the first picture is drawn while textures are made
-        empty = view.picture()
-        view.update(SessionState(scene=write_placed(things)))
-        boxes = []
-        for where in ((5.0, 0.0, 1.0), (4.6, -0.5, 1.3)):
-            view.present(at(*where))
-            boxes.append(view.samples()["areas"].reshape(3, 4))
-            seen = (np.abs(view.picture().astype(int) - empty) > 8).any(axis=-1)
-            pyramid = 0.2 * POINTS[:, [1, 0, 2]] * [-1, 1, 1]  # turned to the left by a quarter
-            corners = [tuple(corner) for corner in pyramid + where]
-            x, y = np.array([projected(each, CameraSettings(**CAMERA)) for each in corners]).T
-            expected = (x.min(), y.min(), x.max(), y.max())
-            np.testing.assert_allclose(boxes[-1][0], expected, atol=0.01)
-            # The pyramid's tip, 0.6 m above the crate's centre, wherever that is.
-            column, row = projected((where[0], where[1], where[2] + 0.6), CameraSettings(**CAMERA))
-            assert seen[round(row) + 4, round(column) - 1 : round(column) + 3].any()
-            assert not seen[round(row) - 3, round(column) - 20 : round(column) + 20].any()
-        np.testing.assert_array_equal(boxes[0][1:], boxes[1][1:])  # the wall stands
-        view.update(SessionState())
-        view.present(at(5.0, 0.0, 1.0))
-        np.testing.assert_array_equal(view.picture(), empty)
-    finally:
-        view.close()

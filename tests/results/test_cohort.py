@@ -11,11 +11,10 @@ from labcrane.cli.app import main
 from results.recorded import STUDY, record, study
 
 
-def test_only_complete_participants_are_included(cohort: Cohort) -> None:
+def test_complete_participants_are_included_and_everybody_else_is_listed_with_a_reason(
+    cohort: Cohort,
+) -> None:
     assert [person.name for person in cohort.included] == ["P001", "P002"]
-
-
-def test_everybody_else_is_listed_with_a_reason(cohort: Cohort) -> None:
     listing = cohort.listing().set_index("participant")
     assert listing["status"].to_dict() == {
         "P001": "complete",
@@ -242,7 +241,6 @@ def test_an_unfinished_pilot_or_simulation_needs_both_of_its_words(
 ) -> None:
     from labcrane.analysis.cohort import kinds_of
     from labcrane.session.commands import Command, Order
-    from results.recorded import record, study
 
     stamps = {kind: True}
     record(study(tmp_path), tmp_path / "data", "P001", orders={0: [Command(Order.END)]}, **stamps)
@@ -265,8 +263,6 @@ def test_an_unfinished_pilot_or_simulation_needs_both_of_its_words(
 
 @pytest.mark.slow
 def test_a_session_that_is_still_to_come_makes_a_participant_half_finished(tmp_path: Path) -> None:
-    from results.recorded import STUDY, record, study
-
     second = "  - name: retention\n    steps:\n      - block: {task: aiming}\n"
     record(study(tmp_path, STUDY + second), tmp_path / "data", "P001")
     (person,) = find_cohort(tmp_path / "data", ["half-finished"]).included

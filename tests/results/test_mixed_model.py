@@ -181,14 +181,6 @@ def significant(design: str, cohorts: range) -> pd.DataFrame:
     return pd.DataFrame(found).astype(float)
 
 
-@pytest.mark.slow
-def test_what_does_not_vary_is_found_in_five_per_cent_of_cohorts() -> None:
-    found = significant("two groups before and after", range(100, 200))
-    assert len(found.columns) == 6
-    assert 0.03 < found.mean(axis=None) < 0.07
-    assert found.mean().max() < 0.12  # 5 of 100 are expected; 12 come in one of 250 tries
-
-
 @pytest.mark.long
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("design", DESIGNS)
@@ -266,22 +258,6 @@ UNLIKE: dict[str, dict[str, Any]] = {
     "one response of eight people, heavy tails": {"people": 8, "tails": TAILS, **CROSSOVER},
 }  # fmt: skip
 """Studies of such people."""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("design", "asked"),
-    [
-        ("retention on another day", ["phase[T.4]", "group[T.visual]:phase[T.4]"]),
-        ("one response to two feedbacks", ["condition[T.v]", "condition[T.w]"]),
-    ],
-)
-def test_people_may_differ_in_another_way_than_the_random_terms(
-    design: str, asked: list[str]
-) -> None:
-    found = [mixed_model(of_unlike_people(at, **UNLIKE[design]), "y").terms for at in range(60)]
-    p = pd.DataFrame([own.set_index("term")["p"] for own in found])[asked]
-    assert 1 <= (p < 0.05).sum().sum() <= 12  # of 120, 6 are expected; 12 % would be 14
 
 
 @pytest.mark.long

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from rehearsal import SHORT
-from scipy.stats import ttest_ind, ttest_rel
+from scipy.stats import ttest_rel
 
 from labcrane.analysis.cohort import Cohort, Status, find_cohort
 from labcrane.analysis.measures import measures_of, measures_of_trials
@@ -233,33 +233,6 @@ def test_means_of_dwell_say_how_much_of_gaze_is_known_and_how_many_movements_los
     assert little_gaze(table.drop(columns=["gaze_valid_before", "gaze_valid_during"])) == 0
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_looks_are_compared_over_groups_and_sessions(seed: int) -> None:
-    """Of two groups, and of two sessions, F is the square of a t."""
-    random = np.random.default_rng(seed)
-    rows = [
-        {"participant": f"P{person:03}", "group": "beep" if person % 2 else "none",
-         "session": session, "sequence": place, "distance": 3.0, "outcome": "success",
-         "dwell_during_grapple": random.normal(0.3 * session + 0.2 * (person % 2), 0.3)}
-        for person in range(10) for session in (1, 2) for place in range(3)
-    ]  # fmt: skip
-    table = with_factors(pd.DataFrame(rows))
-    found = tested.gaze_tests(table, factors_of(table)).set_index("factor")
-    means = table.groupby(["participant", "group", "session"])["dwell_during_grapple"].mean()
-    cells = means.unstack().reset_index("group")
-    groups = [own[[1, 2]].mean(axis=1) for _, own in cells.groupby("group")]
-    between = ttest_ind(*groups)
-    assert found.loc["group", "f"] == pytest.approx(between.statistic**2)
-    assert found.loc["group", "p_gg"] == pytest.approx(between.pvalue)
-    assert found.loc["group", ["df1", "df2"]].tolist() == [1, 8]
-    gain = cells[2] - cells[1]
-    slopes = ttest_ind(*(own for _, own in gain.groupby(cells["group"])))
-    assert found.loc["group:session", "f"] == pytest.approx(slopes.statistic**2)
-    # With groups of one size the sessions are tested against what is left within groups.
-    left = sum(((own - own.mean()) ** 2).sum() for _, own in gain.groupby(cells["group"]))
-    assert found.loc["session", "f"] == pytest.approx(gain.mean() ** 2 * len(gain) / (left / 8))
-
-
 @pytest.mark.slow
 def test_trials_that_are_no_results_are_listed_with_the_reason(data: Path) -> None:
     cohort = find_cohort(data, ["half-finished"])
@@ -400,13 +373,3 @@ def test_wrong_words_are_refused(
     assert "tables.streams is " in said
     assert main(["export", str(data), "--to", "bids", "--out", out, "--set", "every"]) == 2
     assert "--set 'every' is not an assignment; write NAME=VALUE" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_the_report_command_names_its_page(
-    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["report", str(data), "--out", str(tmp_path / "report")]) == 3  # P007 is a wreck
-    said = capsys.readouterr().out
-    assert "2/2" in said
-    assert (tmp_path / "report" / "report.html").is_file()

@@ -323,21 +323,6 @@ def test_one_who_was_judged_before_the_process_died_is_not_waited_for_again(
     assert session.trials.iloc[-1]["completion"] == 0
 
 
-def test_a_simulated_session_goes_on_at_once_and_owes_nothing(tmp_path: Path) -> None:
-    class Nobody(ScriptedConsole):
-        def commands(self) -> list[Command]:
-            assert len(self.told) < 1000
-            return super().commands()
-
-    watched = run(a_visit(tmp_path), Supervisor(lambda event: [GO]))
-    assert open_recording(watched).session(1).context["awaits_judgement"] is True
-    visit = a_visit(tmp_path, simulated=True)
-    session = open_recording(run(visit, Nobody())).session(1)
-    assert "awaits_judgement" not in session.context
-    assert data_of(session, "judgement.awaited") == []
-    assert data_of(session, "session.end") == [{"reason": "complete", "owed": ""}]
-
-
 def test_without_a_time_of_reference_there_is_no_indicator_and_nothing_waits(
     tmp_path: Path,
 ) -> None:

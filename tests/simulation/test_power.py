@@ -89,16 +89,6 @@ def test_an_effect_that_is_put_in_is_found_among_people_who_differ_as_they_did(
         assert found.null == pytest.approx(0.05, abs=ERROR)
 
 
-@pytest.mark.parametrize("text", ["movement_time~group", "movement_time~group[none,visual]=0.8"])
-def test_the_power_between_groups_is_that_of_the_t_test(text: str) -> None:
-    difference = 2.0 if "=" in text else 0.8  # what is put in takes its place
-    pool = make_pool(groups(difference), read_effect(text))
-    for found in power(pool, read_effect(text), SIZES, COHORTS, seed=4):
-        expected = TTestIndPower().power(0.8, found.participants / 2, 0.05)
-        assert found.power == pytest.approx(expected, abs=ERROR + 0.02)  # of Welch's test
-        assert found.null == pytest.approx(0.05, abs=4.0 * np.sqrt(0.05 * 0.95 / COHORTS) + 0.005)
-
-
 LEAVES = 0.4
 """Share of the participants who leave before the end."""
 
@@ -128,24 +118,6 @@ def test_the_power_of_a_cohort_is_that_of_those_of_it_who_stay() -> None:
             of_all = TTestPower().power(size, found.participants, 0.05)
             assert found.power < of_all - 0.03, "nobody who left is missed"
             assert found.null == pytest.approx(0.05, abs=4.0 * np.sqrt(0.05 * 0.95 / COHORTS))
-
-
-def test_whoever_of_a_group_has_no_result_is_one_of_the_cohort() -> None:
-    movements, effect = groups(0.9), read_effect("movement_time~group")
-    gone = np.arange(4000) % 10 < 10 * LEAVES
-    pool = make_pool(movements.assign(outcome=np.where(gone, "timeout", "success")), effect)
-    assert len(pool.means) == 4000
-    assert len(pool.left_out) == gone.sum()
-    stayed = movements[~gone].groupby("group")["movement_time"]
-    size = float(stayed.mean().diff().iloc[-1] / stayed.std().mean())
-    for found in power(pool, effect, (16, 32), COHORTS, seed=7):
-        half = found.participants // 2
-        stay = np.arange(2, half + 1)
-        chance = binom.pmf(stay, half, 1.0 - LEAVES)
-        theory = [
-            [TTestIndPower().power(size, one, 0.05, other / one) for other in stay] for one in stay
-        ]
-        assert found.power == pytest.approx(float(chance @ theory @ chance), abs=ERROR + 0.02)
 
 
 def of_two_groups(
