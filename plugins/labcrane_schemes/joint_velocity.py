@@ -9,7 +9,7 @@ import numpy as np
 from labcrane import Controller, FloatArray, Machine, Run
 from labcrane.core import Kernel, Sphere
 from labcrane_schemes.attainable import attainable
-from labcrane_schemes.axis_map import check_joints, find_axes
+from labcrane_schemes.axis_map import find_axes
 from labcrane_schemes.law import block, command, hands, kernel_of, put_sticks
 from labcrane_schemes.settings import JointVelocitySettings
 from labcrane_schemes.signals import rest, scheme_signals
@@ -19,7 +19,6 @@ class JointVelocity(Controller):
     """Turns each joint at a share of its speed."""
 
     def __init__(self, settings: JointVelocitySettings, machine: Machine) -> None:
-        check_joints(machine.names, settings.map)
         self.signals = scheme_signals(machine)
         self._settings = settings
         self._machine = machine

@@ -90,18 +90,6 @@ def test_a_mistake_ends_with_code_2_and_no_traceback(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.slow
-def test_a_real_session_without_joysticks_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "study.yaml").write_text(SHORT, encoding="utf-8")
-    done = labcrane_command(
-        "run", "study.yaml", "--participant", "P001", "--local", "--pilot", cwd=tmp_path
-    )
-    assert done.returncode == 1
-    assert done.stderr.startswith("labcrane: ")
-    assert "joystick" in done.stderr
-    assert "Traceback" not in done.stderr
-
-
 def test_fast_without_simulate_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -109,35 +97,6 @@ def test_fast_without_simulate_is_refused(
     path = str(tmp_path / "study.yaml")
     assert main(["run", path, "--participant", "P001", "--fast"]) == 2
     assert "--fast needs --simulate" in capsys.readouterr().err
-
-
-@needs("mujoco")
-def test_check_says_that_a_protocol_is_fine(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", str(AIMING)]) == 0
-    assert "study 'aiming' is fine: 1 session on the CH8 knuckle boom" in capsys.readouterr().out
-
-
-def test_plan_lists_every_participants_own_order(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plan", str(AIMING), "--participants", "3"]) == 0
-    said = capsys.readouterr().out
-    assert all(name in said for name in ("P001", "P002", "P003"))
-    assert "P004" not in said
-    assert "session 1 'acquisition': about" in said
-
-
-def test_a_planned_order_is_the_one_that_is_run() -> None:
-    from labcrane.design.plan import plan_session
-    from labcrane.protocol.study import load
-    from labcrane.registry.registry import discover
-
-    study = load(AIMING, discover())
-    one, again, other = (plan_session(study, name, 1) for name in ("P001", "P001", "P002"))
-    assert one == again
-    assert one.blocks[0].levels != other.blocks[0].levels
-    (block,) = one.blocks
-    pairs = [trial.planned.condition["pair"] for trial in block.trials if not trial.planned.counted]
-    assert tuple(pairs) == block.levels["pairs"]
-    assert sum(trial.planned.counted for trial in block.trials) == 32
 
 
 @pytest.mark.slow
@@ -161,12 +120,6 @@ def test_lines_of_a_pipe_are_orders(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert "order.note" in names
     assert session.events["data"][names.index("order.note")]["text"] == "hello there"
     assert session.events["data"][names.index("session.end")]["reason"] == "by order"
-
-
-@pytest.mark.parametrize("command", ["demo", "run", "check", "plan", "plugins"])
-def test_every_command_has_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([command, "--help"]) == 0
-    assert "Usage" in capsys.readouterr().out
 
 
 def test_groups_of_plugins_have_the_plugins_own_words(

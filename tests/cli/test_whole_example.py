@@ -76,17 +76,3 @@ def test_a_session_that_was_run_is_refused_before_anything_is_shown(
     assert "P001-PILOT has an unfinished session 1" in said.err
     assert "its process died; to continue, run: labcrane resume" in said.err
     assert "--participant P001 --session 1 --pilot" in " ".join(said.err.split())
-
-
-@pytest.mark.parametrize("pilot", [[], ["--pilot"]])
-def test_a_hurried_session_that_was_run_is_refused_before_anything_is_shown(
-    protocol: Path, capsys: pytest.CaptureFixture[str], pilot: list[str]
-) -> None:
-    stamps = "-PILOT-SIMULATED" if pilot else "-SIMULATED"
-    (protocol.parent / "data" / f"P001{stamps}").mkdir(parents=True)
-    (protocol.parent / "data" / f"P001{stamps}" / "ses-01_run.xdf").write_bytes(b"XDF:")
-    words = ["run", str(protocol), "--participant", "P001", "--simulate", "--fast", *pilot]
-    assert main(words) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert f"P001{stamps} has an unfinished session 1" in said.err

@@ -57,37 +57,6 @@ def test_a_recording_without_frames_is_named_left_out_and_the_rest_is_exported(
     assert any(path.is_file() for path in out.rglob("*"))
 
 
-@pytest.mark.slow
-def test_a_report_is_of_those_who_can_be_used_and_says_who_cannot(
-    lab: Path, tmp_path: Path, capsys
-) -> None:
-    out = tmp_path / "report"
-    assert main(["report", str(lab), "--out", str(out), "--include", "half-finished"]) == 3
-    assert "2 recordings cannot be used: P004, P005" in capsys.readouterr().out
-    page = (out / "report.html").read_text()
-    assert "P004" in page
-    assert "contains no frames" in page
-    assert (out / "participants" / "P003.html").is_file()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("words", [["export", "--to", "tables"], ["report"]], ids=" ".join)
-def test_a_recording_that_breaks_off_in_its_middle_is_left_out_by_itself(
-    lab: Path, tmp_path: Path, capsys, words: list[str]
-) -> None:
-    data = tmp_path / "data"
-    for name in ("P001", "P002"):
-        shutil.copytree(lab / name, data / name)
-    broken = data / "P001" / "P001.h5"
-    with h5py.File(broken, "r+") as file:
-        del file["ses-01/loop/due"]
-    whole = main([*words, str(data), "--out", str(tmp_path / "out")])
-    said = " ".join(capsys.readouterr().out.split())
-    assert whole == 3, said
-    assert "left out: P001, cannot be used:" in said
-    assert "1 recordings cannot be used: P001" in said
-
-
 def read_all(path: Path) -> str:
     """Return everything that a participant file holds, as a sum of it."""
     recording = open_recording(path)

@@ -1,6 +1,5 @@
 """The register, consent, session windows and deviations."""
 
-import json
 import os
 import re
 import shutil
@@ -275,12 +274,6 @@ def test_a_note_that_leads_to_a_person_is_refused_everywhere(lab: Lab) -> None:
     assert "an e-mail address" in event["refused"]
     for path in lab.places.files():
         assert b"anna@" not in path.read_bytes()
-
-
-def test_no_name_is_asked_for_or_kept(lab: Lab) -> None:
-    lab.consent("P001")
-    register = json.loads(lab.places.register.read_text(encoding="utf-8"))
-    assert not {"name", "email", "phone"} & set(register["participants"]["P001"])
 
 
 def test_people_need_joysticks_and_leave_no_session_when_there_are_none(tmp_path: Path) -> None:

@@ -343,14 +343,6 @@ def test_a_doctor_that_fails_gives_an_archive_that_says_it_is_missing(
     assert planted_in(archive) == []
 
 
-def test_a_protocol_that_is_no_text_gives_an_archive(here: Path) -> None:
-    protocol = a_protocol(here)
-    protocol.write_bytes(b"\xff\xfe\x00" + PERSON.encode())
-    archive = report("--protocol", protocol, "--yes")
-    assert json.loads(file_of(archive, "doctor.json"))["failed"]
-    assert planted_in(archive) == []
-
-
 def test_a_class_and_a_function_of_a_study_are_not_named(here: Path) -> None:
     own = here / f"of_{PERSON.lower()}.py"
     own.write_text(

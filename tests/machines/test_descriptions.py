@@ -115,40 +115,6 @@ def test_the_openmanipulator_is_the_one_whose_figures_the_crane_has() -> None:
     assert machine.joints[3].mass_kg == pytest.approx(0.16)  # with the gripper that is fixed to it
 
 
-@needs("pybullet")
-@pytest.mark.parametrize("seed", range(12))
-def test_any_urdf_of_a_slewing_base_with_pitch_joints_moves_as_pybullet_moves_it(
-    seed: int, tmp_path: Path
-) -> None:
-    import pybullet
-
-    text, _, names = random_urdf(seed)
-    (tmp_path / "any.urdf").write_text(text)
-    called = {f"j{number}": name for number, name in enumerate(names)}
-    machine = described({"urdf": "any.urdf", "joints": called, "tip": "tip"}, tmp_path)
-    signs = signs_of(machine, (-1.1, 1.3))
-    client = pybullet.connect(pybullet.DIRECT)
-    try:
-        body = pybullet.loadURDF(
-            str(tmp_path / "any.urdf"), useFixedBase=True, physicsClientId=client,
-            flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
-        )  # fmt: skip
-        at = {
-            pybullet.getJointInfo(body, number, physicsClientId=client)[1].decode(): number
-            for number in range(pybullet.getNumJoints(body, physicsClientId=client))
-        }
-        for angles in poses(machine, 40):
-            for name, angle in zip(names, signs * angles, strict=True):
-                pybullet.resetJointState(body, at[name], angle, physicsClientId=client)
-            there = pybullet.getLinkState(
-                body, at["end"], computeForwardKinematics=True, physicsClientId=client
-            )[4]
-            assert link_frames(machine, angles)[-1][:3, 3] == pytest.approx(there, abs=2e-6)
-            assert Arm(machine).tip(angles) == pytest.approx(there, abs=2e-6)
-    finally:
-        pybullet.disconnect(client)
-
-
 @pytest.mark.parametrize("seed", range(20, 26))
 def test_any_urdf_moves_as_an_independent_library_moves_it(seed: int, tmp_path: Path) -> None:
     import yourdfpy
@@ -163,6 +129,7 @@ def test_any_urdf_moves_as_an_independent_library_moves_it(seed: int, tmp_path: 
         robot.update_cfg(dict(zip(names, signs * angles, strict=True)))
         there = robot.get_transform("tip", "base")[:3, 3]
         assert link_frames(machine, angles)[-1][:3, 3] == pytest.approx(there, abs=1e-9)
+        assert Arm(machine).tip(angles) == pytest.approx(there, abs=1e-9)
 
 
 @needs("mujoco")
@@ -341,24 +308,6 @@ def test_a_study_on_an_excavator_of_an_mjcf_file_is_checked_run_and_replayed(
     assert main(["replay", str(recording)]) == 0, capsys.readouterr()
 
 
-def test_a_mistake_in_a_description_is_told_with_its_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from labcrane.cli.app import main
-
-    (tmp_path / "arm.urdf").write_text((EXAMPLES / "openmanipulator_x.urdf").read_text())
-    path = tmp_path / "protocol.yaml"
-    written = "\n  urdf: arm.urdf\n  joints: [joint1, joint2, joint3]\n  tipp: gripper"
-    text = STUDY.format(
-        word="arm", machine=written, map="{}", engine="kinematic_crane", distance=0.1, width=0.02
-    )
-    path.write_text(text)
-    assert main(["check", str(path)]) == 2
-    said = " ".join(capsys.readouterr().err.split())
-    assert "protocol.yaml:8" in said
-    assert "'tipp' is not a key of machine" in said
-
-
 MIMIC = """\
 <robot name="levelled">
  <link name="base"/>{links}<link name="fork"/>
@@ -380,9 +329,12 @@ WEIGHT = '<mass value="9"/><inertia ixx="1" iyy="1" izz="1"/>'
 
 
 def levelled(
-    folder: Path, mimic: str, beside: str = "", joints: str = "slew lift reach"
+    folder: Path, mimic: str, beside: str = "", joints: str = "slew lift reach", own: str = WEIGHT
 ) -> Machine:
-    links = "".join(f'<link name="l{at}"><inertial>{WEIGHT}</inertial></link>' for at in range(5))
+    weights = (WEIGHT, WEIGHT, own, WEIGHT, WEIGHT)
+    links = "".join(
+        f'<link name="l{at}"><inertial>{each}</inertial></link>' for at, each in enumerate(weights)
+    )
     (folder / "arm.urdf").write_text(MIMIC.format(links=links, mimic=mimic, beside=beside))
     return described({"urdf": "arm.urdf", "joints": joints.split(), "tip": "fork"}, folder)
 
@@ -531,20 +483,7 @@ def inertia_of(moments: np.ndarray, dice: np.random.Generator) -> str:
 
 
 def with_inertia(folder: Path, inertia: str, mass: float = 9.0) -> Machine:
-    text = MIMIC.format(
-        links="".join(
-            f'<link name="l{at}"><inertial>'
-            + (f'<mass value="{mass}"/><inertia {inertia}/>' if at == 2 else WEIGHT)
-            + "</inertial></link>"
-            for at in range(5)
-        ),
-        mimic="",
-        beside="",
-    )
-    (folder / "arm.urdf").write_text(text)
-    return described(
-        {"urdf": "arm.urdf", "joints": ["slew", "lift", "reach"], "tip": "fork"}, folder
-    )
+    return levelled(folder, "", own=f'<mass value="{mass}"/><inertia {inertia}/>')
 
 
 @pytest.mark.parametrize("seed", range(8))

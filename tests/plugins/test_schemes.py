@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scheme_setups import (
     ARM,
-    JOINTS,
     LOW,
     MACHINES,
     end_effector,
@@ -16,16 +15,14 @@ from scheme_setups import (
     switchable,
 )
 
-from labcrane import Controller, ProtocolError, Settings
+from labcrane import Controller, Settings
 from labcrane.machines import jacobian
 from labcrane.testing import (
     RATE_HZ,
     ControllerContract,
     ch8,
     crane_at,
-    make_run,
     make_trial,
-    opened,
 )
 from labcrane_schemes import labcrane_controllers
 from labcrane_schemes.end_effector import EndEffector
@@ -227,37 +224,3 @@ def test_at_rest_nothing_is_limited() -> None:
 
 
 # --- what a protocol gets wrong
-
-
-def test_a_joint_the_machine_lacks_is_refused_with_those_it_has() -> None:
-    with pytest.raises(ProtocolError, match=r"'boom'; the machine has slew, shoulder, elbow"):
-        JointVelocity(joint_velocity(map=JOINTS | {"boom": "left.x"}), ch8())
-
-
-def test_a_joint_without_an_axis_is_refused() -> None:
-    three = {joint: axis for joint, axis in JOINTS.items() if joint != "wrist"}
-    with pytest.raises(ProtocolError, match="no axis for joint 'wrist'"):
-        JointVelocity(joint_velocity(map=three), ch8())
-
-
-def test_an_axis_the_input_lacks_is_refused_with_those_it_has() -> None:
-    scheme = JointVelocity(joint_velocity(map=JOINTS | {"wrist": "right.twist"}), ch8())
-    with (
-        pytest.raises(ProtocolError, match=r"no 'right.twist'; it has left.x, left.y") as caught,
-        opened(scheme, make_run(ch8(), command=scheme.signals)),
-    ):
-        pass
-    assert caught.value.__notes__ == ["map asks for it to move 'wrist'"]
-
-
-def test_an_axis_that_would_move_two_joints_is_refused() -> None:
-    scheme = JointVelocity(joint_velocity(map=JOINTS | {"wrist": "-left.x"}), ch8())
-    with pytest.raises(ProtocolError, match=r"'left\.x' is mapped to both 'slew' and 'wrist'"):
-        scheme.open(make_run(ch8(), command=scheme.signals))
-
-
-def test_directions_must_fit_the_frame() -> None:
-    scheme = EndEffector(end_effector(frame="arm"), ch8())
-    said = "has no axis for 'radial'; it needs one for each of radial, tangential, vertical"
-    with pytest.raises(ProtocolError, match=said):
-        scheme.open(make_run(ch8(), command=scheme.signals))

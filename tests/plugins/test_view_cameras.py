@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 from windows import MACHINE, SIZE, a_view, make_frame, projected, shown
 
 from labcrane import DeviceError, Frame
@@ -96,11 +95,6 @@ def test_what_needs_opengl_is_refused_without(wanted: dict[str, object], why: st
     said = f"^{why}, which the software renderer cannot; use OpenGL"
     with pytest.raises(DeviceError, match=said), a_view(renderer="software", **wanted):
         pass
-
-
-def test_a_depth_range_rises() -> None:
-    with pytest.raises(ValidationError, match=r"depth_m is 5 to 2 m; the second must be farther"):
-        CameraSettings(**STILL, depth_m=(5.0, 2.0))
 
 
 def lower_half(view: object, frame: Frame) -> np.ndarray:

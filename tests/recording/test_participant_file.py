@@ -149,12 +149,6 @@ def test_everything_is_safe_for_r_and_matlab(path: Path) -> None:
             assert node.compression in (None, "gzip"), name
 
 
-def test_units_of_trials_are_those_of_the_context(path: Path) -> None:
-    with h5py.File(path) as file:
-        assert file["ses-01/trials/movement_time"].attrs["unit"] == "s"
-        assert file["ses-01/trials/width"].attrs["unit"] == "1"
-
-
 def test_the_file_says_what_its_phases_and_trial_numbers_mean(path: Path) -> None:
     with h5py.File(path) as file:
         said = file["ses-01/loop/trial"].attrs["definition"]
@@ -306,11 +300,6 @@ def test_what_is_no_participant_file_is_refused(tmp_path: Path, name: str) -> No
         h5py.File(path, "w").close()
     with pytest.raises(RecordingError, match=name):
         open_recording(path)
-
-
-def test_an_unknown_session_is_named_with_those_there_are(recording: Recording) -> None:
-    with pytest.raises(RecordingError, match="has no session 2; it has 1"):
-        recording.session(2)
 
 
 def test_importing_the_reader_loads_neither_pandas_nor_h5py() -> None:

@@ -121,11 +121,6 @@ def test_the_viewer_says_both_numbers_of_a_trial_of_a_resumed_session(visit: Vis
     assert set(counts.counted) == set(record.trials["trial"][record.trials["practice"] == 0])
 
 
-@pytest.mark.parametrize("outcome", ["repeated", "ended", "interrupted"])
-def test_a_trial_that_is_run_again_is_not_done(outcome: str) -> None:
-    assert not is_done({"counted": True, "practice": False, "outcome": outcome})
-
-
 def test_spans_of_any_numbers_are_read_back() -> None:
     dice = random.Random(1)
     for _ in range(200):

@@ -137,15 +137,6 @@ def test_answers_of_a_simulation_are_replayed(
     assert main(["replay", str(file), "--session", "1"]) == 0, capsys.readouterr().out
 
 
-def test_a_simulated_participant_answers_everything_the_same_way_each_time(tmp_path: Path) -> None:
-    study = a_study(tmp_path, f"{HEAD}{RATINGS}".replace("subjective_accuracy\n", "nasa_tlx\n"))
-    first, again = (
-        [event.data for event in rehearse(study).events("questionnaire.answer")] for _ in range(2)
-    )
-    assert len(first) == 7
-    assert first == again
-
-
 def test_simulated_people_do_not_answer_alike_in_every_session(tmp_path: Path) -> None:
     asks = "    steps:\n      - questionnaire: subjective_accuracy\n"
     sessions = "".join(f"  - name: day {day}\n{asks}" for day in range(1, 6))

@@ -139,13 +139,6 @@ def test_what_no_task_asks_about_cannot_be_reported_nor_anything_before_a_trial(
     assert within.data["refused"] == "this task asks for reports of nothing"
 
 
-def test_notes_and_the_completion_flag_are_in_the_record(study: Study) -> None:
-    orders = {5: give(Order.NOTE, "coughs"), 6: give(Order.COMPLETION, "0")}
-    seen = rehearse(study, orders)
-    assert seen.events("order.note")[0].data["text"] == "coughs"
-    assert seen.events("trial.end")[0].data["completion"] == 0
-
-
 @pytest.mark.slow
 def test_a_test_that_has_ended_is_judged_until_the_next_begins(tmp_path: Path) -> None:
     text = SHORT.replace("task: aiming", "task: aiming, ask: [subjective_accuracy]")
@@ -165,15 +158,6 @@ def test_a_test_that_has_ended_is_judged_until_the_next_begins(tmp_path: Path) -
         told = (order.data["refused"], order.data["trial"], order.data["after"])
         assert told == (None, row["trial"], True)
     assert row["completion"] is None  # as it ended; the participant file has what was set
-
-
-def test_before_the_first_trial_there_is_nothing_to_judge(study: Study) -> None:
-    orders = {5: give(Order.COMPLETION, "1"), 6: give(Order.OVERRIDE), 40: give(Order.START)}
-    seen = rehearse(study, orders, waits=True)
-    for name in ("order.completion", "order.override"):
-        (order,) = seen.events(name)
-        assert order.data["refused"] == "no trial is running or has ended"
-        assert "after" not in order.data
 
 
 def test_an_overridden_trial_outlasts_its_limit(tmp_path: Path) -> None:
@@ -293,24 +277,6 @@ def test_lost_input_ends_the_session_when_the_protocol_says_so(tmp_path: Path) -
     seen = rehearse(study, rig=rig)
     assert seen.events("session.end")[0].data["reason"] == "input lost"
     assert seen.frames[-1].tick.number <= 301
-
-
-@pytest.mark.slow
-def test_the_same_seed_gives_the_same_frames(study: Study) -> None:
-    one, two = rehearse(study), rehearse(study)
-    assert len(one.frames) == len(two.frames)
-    for a, b in zip(one.frames, two.frames, strict=True):
-        assert a.state.tobytes() == b.state.tobytes()
-        assert a.axes.tobytes() == b.axes.tobytes()
-
-
-def test_an_axis_that_the_device_does_not_have_is_refused_before_the_first_tick(
-    tmp_path: Path,
-) -> None:
-    from labcrane import ProtocolError
-
-    with pytest.raises(ProtocolError, match=r"'-left\.z'"):
-        a_study(tmp_path, SHORT.replace("left.x", "left.z"))
 
 
 PAUSING = "on_fault: {feedback_lost: pause}\n"

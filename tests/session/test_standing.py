@@ -3,7 +3,6 @@
 import random
 from collections.abc import Mapping
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -228,9 +227,3 @@ def test_before_a_session_begins_only_its_end_can_be_ordered() -> None:
     assert presses(awaited)["order-start"] == "the session is waiting for feedback tone"
     assert presses(awaited)["order-pause"] == ""
     assert state_of(awaited) == "starting"
-
-
-def test_a_trial_that_ended_is_the_one_that_is_judged() -> None:
-    view = after(("trial.start", TRIAL), ("trial.end", TRIAL))
-    assert view.standing.last == TRIAL
-    assert SimpleNamespace(**view.standing.trial) == SimpleNamespace()
