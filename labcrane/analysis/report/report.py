@@ -10,7 +10,7 @@ from labcrane.analysis.codebook import trial_codebook
 from labcrane.analysis.cohort import INCLUDABLE, Cohort, Participant, kinds_of
 from labcrane.analysis.gaze import fixations_of, with_unseen_areas
 from labcrane.analysis.gaze_streams import unmeasured_of
-from labcrane.analysis.measures import DEFAULTS, MeasureSettings, measures_of
+from labcrane.analysis.measures import DEFAULTS, measures_of
 from labcrane.analysis.parallel import work
 from labcrane.analysis.quality import (
     exclusions,
@@ -63,7 +63,6 @@ FAULTS = "faults.txt"
 def write_report(
     cohort: Cohort,
     folder: Path,
-    settings: MeasureSettings = DEFAULTS,
     progress: Callable[[int, int], None] | None = None,
     leave_out: Callable[[str, Unusable], None] | None = None,
     workers: int = 1,
@@ -91,7 +90,7 @@ def write_report(
     """
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "participants").mkdir(exist_ok=True)
-    one = partial(_one, settings=settings, folder=folder.resolve())
+    one = partial(_one, folder=folder.resolve())
     found: dict[str, Tables] = {}
     for name, made in work(one, cohort.included, workers, scheduler):
         if not isinstance(made, Unusable):
@@ -135,7 +134,7 @@ def write_report(
         page.say(f"Used on request, though timestamp accuracy is unknown: {'; '.join(unprobed)}.")
     page.lead(answer(cohort, everything, (tables["loop"], tables["sync"]), about, results))
     page.heading("Definitions")
-    words = "; ".join(f"{name} {_setting(value)}" for name, value in asdict(settings).items())
+    words = "; ".join(f"{name} {_setting(value)}" for name, value in asdict(DEFAULTS).items())
     page.say(f"Settings of the measures: {words}.")
     page.say(
         "A movement begins when the tip is first faster than onset_speed for onset_hold, columns "
@@ -173,13 +172,11 @@ def _joined(of_each: Sequence[Tables]) -> Tables:
     return joined
 
 
-def _one(
-    participant: Participant, settings: MeasureSettings, folder: Path
-) -> tuple[str, Tables | Unusable]:
+def _one(participant: Participant, folder: Path) -> tuple[str, Tables | Unusable]:
     """Write one participant's page; return the tables, or the reason why there are none."""
     try:
         with kept_open(participant.path):
-            own = measures_of(participant, settings)
+            own = measures_of(participant)
             if GROUP not in own:  # trials say it where the study has groups
                 own.insert(0, GROUP, str(participant.context.get("group", "")))
             tables = {"movements": own} | {name: of(participant) for name, of in TABLES.items()}
@@ -430,11 +427,11 @@ def _of_primary(primary: Sequence[str], measures: Sequence[str]) -> str:
     return f"{said} Without a value in any movement: {', '.join(missing)}." if missing else said
 
 
-def _coarse_sticks(results: "pd.DataFrame", settings: MeasureSettings = DEFAULTS) -> str:
+def _coarse_sticks(results: "pd.DataFrame") -> str:
     """Return what decides the measures of the sticks instead of the hands; empty for nothing."""
     if "stick_step" not in results:
         return ""
-    least_change = settings.moving_rate * settings.rate_window_s
+    least_change = DEFAULTS.moving_rate * DEFAULTS.rate_window_s
     used, found = results["stick_step"].notna(), []
     for count, why in (
         (
@@ -443,13 +440,13 @@ def _coarse_sticks(results: "pd.DataFrame", settings: MeasureSettings = DEFAULTS
             "and aggressiveness",
         ),
         (
-            (results["stick_least"] > settings.hysteresis).sum(),
-            f"no deflection is smaller than {settings.hysteresis:g}, as with a dead zone, which "
+            (results["stick_least"] > DEFAULTS.hysteresis).sum(),
+            f"no deflection is smaller than {DEFAULTS.hysteresis:g}, as with a dead zone, which "
             "decides reversals and the use of the axes",
         ),
         (
             (used & results["stick_centroid"].isna()).sum(),
-            f"the loop is too slow for {settings.stick_highest_hz:g} Hz, so that stick_power and "
+            f"the loop is too slow for {DEFAULTS.stick_highest_hz:g} Hz, so that stick_power and "
             "stick_centroid are missing",
         ),
     ):
