@@ -189,7 +189,8 @@ def cut(frames: Groups, trials: "pd.DataFrame", rate_hz: float) -> Iterator[Move
     if "assist.share" in asked:
         assist = {who: _array(asked, _below(asked, f"assist.{who}")) for who in HANDS}
         assist["share"] = _array(asked, ["assist.share"])
-    own = [name for name in map(str, frames["input"]) if not name.startswith("assist.")]
+    others = ("assist.", "estimate.")
+    own = [name for name in map(str, frames["input"]) if not name.startswith(others)]
     axes = {name: _array(frames["input"], [name])[:, 0] for name in own}
     for row, edges in zip(trials.to_dict("records"), _edges(trials).T, strict=True):
         first, last = np.searchsorted(due, edges)

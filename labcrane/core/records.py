@@ -200,6 +200,25 @@ class Run:
     places: tuple[Sphere, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Estimated:
+    """Values of an estimate. Times in seconds, on the clock of the times that it was given.
+
+    Attributes
+    ----------
+    time
+        What the values stand for: the moment from which they are known, or the middle of a window.
+    first
+        The first sample that they were computed from; the last is the newest that was given.
+    values
+        In the order of :attr:`EstimateSettings.values`; NaN for one that cannot be computed.
+    """
+
+    time: float
+    first: float
+    values: tuple[float, ...]
+
+
 @dataclass(slots=True)
 class Frame:
     """Everything that happened in one tick.

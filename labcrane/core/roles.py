@@ -12,6 +12,7 @@ every role; a plugin's tests subclass it.
 :class:`~labcrane.analysis.exporter.Exporter` works on recordings, long after.
 A Trigger reports events to other devices, in the tick in which they are known.
 A SignalMonitor checks external streams, in a process next to the recorder.
+An Estimate computes values from them while the session runs, in a process of its own.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
         CameraImage,
         Captured,
         Echo,
+        Estimated,
         Frame,
         PlannedTrial,
         Run,
@@ -261,6 +263,35 @@ class SignalMonitor(Component):
         samples
             Shape ``(n, n_channels)``, in the units of the stream's header, with all values that the
             source sends; ``n`` is the number of new samples, up to some seconds of them.
+        """
+
+
+class Estimate(Component):
+    """Estimates values from a stream while a session runs: load from an EEG, heart rate.
+
+    It runs in a process of its own, which is started again whenever it fails; ``open`` and
+    ``begin_trial`` are never called. Its settings are
+    :class:`~labcrane.core.settings.EstimateSettings` and name its values.
+    """
+
+    @abstractmethod
+    def begin(self, stream: SignalStream) -> None:
+        """Prepare for a stream, before its first samples; forget all others.
+
+        Raise StreamError if the stream does not have what is needed.
+        """
+
+    @abstractmethod
+    def update(self, times: FloatArray, samples: FloatArray) -> Estimated | None:
+        """Take the next samples; return the newest values, None while there are too few samples.
+
+        Parameters
+        ----------
+        times
+            On the session's clock in seconds, as far as the source's clock is known by now, shape
+            ``(n,)``, n > 0; they may jump or repeat.
+        samples
+            Shape ``(n, n_channels)``, with all values that the source sends.
         """
 
 

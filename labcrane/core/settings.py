@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     Field,
+    FiniteFloat,
     NonNegativeInt,
+    PositiveFloat,
     PositiveInt,
     ValidationInfo,
+    model_validator,
 )
 
 from labcrane.core.references import Reference
@@ -138,6 +141,34 @@ class CaptureSettings(Settings):
     required: bool = True
     """Whether a session waits for it. If it fails later, the session pauses as for a required
     stream (`on_fault.stream_lost`)."""
+
+
+class EstimateSettings(Settings):
+    """Base of the settings of estimates."""
+
+    values: ClassVar[tuple[str, ...]] = ()
+    """Names of its values, in the order in which they are returned."""
+
+    stream: str
+    """The stream that it is computed from, by its name under ``streams``."""
+
+    fallback: dict[str, FiniteFloat]
+    """What is used for each of its values while there is none: before enough samples have come,
+    while its stream is silent, and while the value is late or not a number."""
+
+    at_most_age_s: PositiveFloat = 2.0
+    """Age from which a value is late: how long the time that it stands for may be past, in
+    seconds."""
+
+    @model_validator(mode="after")
+    def _falls_back(self) -> Self:
+        if set(self.fallback) != set(self.values):
+            given, needed = (", ".join(each) or "nothing" for each in (self.fallback, self.values))
+            raise WrongKey(
+                f"fallback has {given}, and the values are {needed}; give a number for each",
+                at=("fallback",),
+            )
+        return self
 
 
 def _beside(path: Path, info: ValidationInfo) -> Path:

@@ -13,6 +13,7 @@ from typing import Any
 from labcrane.capture.processes import RecordingProcesses, index_requests
 from labcrane.core.records import Event
 from labcrane.errors import StreamError
+from labcrane.estimation.processes import EstimateProcesses, estimate_requests
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
 from labcrane.launcher.session_handle import SessionHandle
@@ -87,6 +88,7 @@ class Launcher:
         self._recorder: RecorderHandle | None = None
         self._feedback: FeedbackProcesses | None = None
         self._recordings: RecordingProcesses | None = None
+        self._estimates: EstimateProcesses | None = None
         self._lost: set[str] = set()
         self._taken: set[str] = set()
         self._signals = SignalReporter(say)
@@ -129,7 +131,7 @@ class Launcher:
         ]
         if visit.feedback:
             requests += log_requests(visit)
-        requests += index_requests(visit)
+        requests += index_requests(visit) + estimate_requests(visit)
         if requests:
             self._recorder = RecorderHandle(visit.streams_journal, requests, monitor_config(visit))
         report = None
@@ -138,12 +140,15 @@ class Launcher:
                 self._feedback = FeedbackProcesses(visit)
             if visit.study.recordings:
                 self._recordings = RecordingProcesses(visit)
+            self._estimates = EstimateProcesses(visit)
             died = self._run() if self._gate() else None
         finally:
             if self._feedback:
                 self._feedback.stop()
             if self._recordings:
                 self._recordings.stop(self._say)
+            if self._estimates is not None:
+                self._estimates.stop()
             if self._recorder:
                 self._recorder.stop()
             if parts(visit.journal):
@@ -165,7 +170,7 @@ class Launcher:
         if self._feedback and not self._feedback.wait(self._say, self._told_to_end):
             return False
         recorder = self._recorder
-        while self._recordings and not self._recordings.settled:
+        while not all(each.settled for each in (self._recordings, self._estimates) if each):
             self._watch_recordings()
             if self._told_to_end():
                 return False
@@ -286,10 +291,13 @@ class Launcher:
         return None
 
     def _watch_recordings(self) -> None:
-        """Start failed recordings again, and tell the recorder where their frames are listed."""
+        """Start failed recordings and estimates again, and tell each which streams there are."""
         if self._recordings and self._recorder:
             self._recordings.watch(self._say)
             self._recorder.offer(self._recordings.sends)
+        if self._estimates is not None and self._recorder:
+            self._estimates.watch(self._recorder.status.get("streams", ()), self._say)
+            self._recorder.offer(self._estimates.sends)
 
     def _watch_streams(self, send: Callable[[Message], None]) -> None:
         recorder = self._recorder

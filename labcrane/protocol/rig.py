@@ -9,6 +9,7 @@ from labcrane.core.roles import Component, Controller, Dynamics, InputDevice, Ta
 from labcrane.core.signals import Layout, Signal
 from labcrane.errors import ProtocolError
 from labcrane.protocol.assisted import Assisted, FourHands
+from labcrane.protocol.estimated import WithEstimates
 from labcrane.protocol.study import Study
 
 
@@ -42,8 +43,12 @@ class Rig:
         }
 
     @classmethod
-    def build(cls, study: Study, *, simulated: bool) -> "Rig":
-        """Build, but do not open, what ``study`` names; a simulated operator replaces the input."""
+    def build(cls, study: Study, *, simulated: bool, source: str = "") -> "Rig":
+        """Build, but do not open, what ``study`` names; a simulated operator replaces the input.
+
+        Estimates are received from the processes of the session ``source``; without one they fall
+        back.
+        """
         machine = study.machine
         device = (study.operator if simulated else study.input).build(machine)
         controller = build_controller(study)
@@ -51,6 +56,8 @@ class Rig:
         # The registry filed each offer under its role.
         assert isinstance(device, InputDevice)  # noqa: S101
         assert isinstance(dynamics, Dynamics)  # noqa: S101
+        if study.estimates:
+            device = WithEstimates(device, study.estimates, source)
         if isinstance(controller, Assisted):
             assistant = study.choices["assist"].build(machine)
             assert isinstance(assistant, InputDevice)  # noqa: S101

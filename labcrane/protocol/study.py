@@ -18,7 +18,7 @@ from labcrane.core.roles import (
     SecondaryTask,
     Task,
 )
-from labcrane.core.settings import Settings
+from labcrane.core.settings import EstimateSettings, Settings
 from labcrane.errors import ProtocolError, meant, nearest
 from labcrane.files.complaints import written
 from labcrane.files.names import check_name
@@ -33,6 +33,9 @@ from labcrane.protocol.tracks import Track
 from labcrane.recording.data_folder import DataFolder
 from labcrane.registry.call_monitor import CallMonitor
 from labcrane.registry.registry import Registry
+
+ESTIMATES = "estimates."
+"""How the parts begin that a study's estimates play."""
 
 
 @dataclass(frozen=True)
@@ -114,6 +117,11 @@ class Study:
     def written(self) -> Mapping[str, object]:
         """Top level of the protocol's file, as it is written; empty for a record."""
         return self.source.data if self.source else {}
+
+    @property
+    def estimates(self) -> Mapping[str, EstimateSettings]:
+        """Settings of the estimates, by the protocol's names."""
+        return _estimates(self.choices)
 
     def window_title(self, view: str) -> str:
         """Return the title of a view's window."""
@@ -546,6 +554,30 @@ class Checker:
                 self._source.problem((*place, at), f"there is no feedback {name!r}; {there}")
 
 
+def _estimates(choices: Mapping[str, ComponentSpec]) -> dict[str, EstimateSettings]:
+    """Return the settings of the estimates, by the protocol's names."""
+    return {
+        part.removeprefix(ESTIMATES): choice.settings
+        for part, choice in choices.items()
+        if part.startswith(ESTIMATES) and isinstance(choice.settings, EstimateSettings)
+    }
+
+
+def _check_estimates(
+    source: YamlFile, protocol: Protocol, estimates: Mapping[str, EstimateSettings]
+) -> None:
+    """Note estimates whose names cannot be columns, and those without a stream."""
+    single = [label for label, each in protocol.streams.items() if not each.several]
+    for name, settings in estimates.items():
+        if not name.isidentifier():
+            message = f"{name!r} names columns; give a word of letters, digits and underscores"
+            source.problem(("estimates", name), message, key=True)
+        if settings.stream not in single:
+            there = nearest(settings.stream, single, "streams has")
+            message = f"there is no single stream {settings.stream!r} under streams; {there}"
+            source.problem(("estimates", name, "stream"), message)
+
+
 def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     """Read and check a protocol.
 
@@ -599,6 +631,8 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     for name in recordings.keys() & (protocol.streams if protocol else {}):
         source.problem(("recordings", name), f"{name!r} is already the name of a stream", key=True)
     monitors, others = chooser.choose_monitors(), chooser.choose_others()
+    if protocol is not None:
+        _check_estimates(source, protocol, _estimates(others))
     named: dict[str, Mapping[str, ComponentSpec]] = {
         "tasks": choices,
         "secondary": secondary,

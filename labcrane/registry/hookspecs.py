@@ -23,6 +23,7 @@ from labcrane.core.roles import (
     Controller,
     Cue,
     Dynamics,
+    Estimate,
     Feedback,
     InputDevice,
     Questionnaire,
@@ -86,6 +87,12 @@ def labcrane_questionnaires() -> Sequence[Offer[Questionnaire]]:
 @hookspec
 def labcrane_monitors() -> Sequence[Offer[SignalMonitor]]:
     """Offer monitors that check whether the signal of a stream is alive."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_estimates() -> Sequence[Offer[Estimate]]:
+    """Offer estimates of values from streams while a session runs."""
     raise NotImplementedError
 
 
@@ -219,6 +226,13 @@ ROLES: Mapping[type[Component], RoleEntry] = {
         "monitor",
         "a monitor of other programs' signals",
         ("monitors",),
+        several=True,
+    ),
+    Estimate: RoleEntry(
+        labcrane_estimates,
+        "estimate",
+        "values estimated from a stream while a session runs",
+        ("estimates",),
         several=True,
     ),
     Trigger: RoleEntry(

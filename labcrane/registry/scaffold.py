@@ -92,6 +92,8 @@ def _using(entry: RoleEntry, protocol: str) -> str:
     key, own = entry.keys[0], "use: my_part"
     if entry.word == "capture":
         own += ", consent: we write lines"
+    if entry.word == "estimate":
+        own += ", stream: grip, fallback: {mean: 0}"
     written = re.search(rf"^{key}:.*\n(?:  .*\n)*", protocol, re.MULTILINE)
     if entry.several:
         named = re.search(r"^  (\w+):", written[0], re.MULTILINE) if written else None
@@ -101,6 +103,8 @@ def _using(entry: RoleEntry, protocol: str) -> str:
     if entry.word == "input":
         operator = f"operator: {{use: my_part}}  {STANDS_IN}"
         protocol = re.sub(r"^operator:.*$", operator, protocol, flags=re.MULTILINE)
+    if entry.word == "estimate":
+        used += "streams:\n  grip: {name: Grip, required: false}\n"
     if entry.word == "cue":  # which views draw
         used += "views:\n  window: {use: view}\n"
     protocol = protocol.replace(written[0] if written else "sessions:\n", used, 1) + (

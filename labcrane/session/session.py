@@ -30,6 +30,7 @@ from labcrane.registry.proxies import loosely_watched
 from labcrane.session import loop
 from labcrane.session.commands import Console
 from labcrane.session.eligibility import Admission, check_eligibility, close_visit
+from labcrane.session.estimates import reporters
 from labcrane.session.metadata import context
 from labcrane.session.overruns import OverrunReporter
 from labcrane.session.postprocess import conclude
@@ -191,7 +192,8 @@ def _record(
     if so_far is None:
         claim(visit)
     carried = _carried(visit) if so_far is None else so_far.carried
-    rig = Rig.build(study, simulated=visit.simulated)
+    source = "" if visit.fast else visit.source
+    rig = Rig.build(study, simulated=visit.simulated, source=source)
     clock = _clock(visit, so_far)
     died = visit.died or read_crash_marker(visit.crash_marker) if visit.resumed else None
     with (
@@ -226,7 +228,8 @@ def _record(
                 _triggers(visit, run, log, console) as triggers,
                 _outlets(visit, whole, done, run, offer) as outlets,
             ):
-                sinks = [*triggers, *outlets, _teller(console)]
+                estimates = reporters(study.estimates, run.axes, log, console)
+                sinks = [*triggers, *outlets, *estimates, _teller(console)]
                 if not visit.fast:
                     sinks.append(OverrunReporter(study.call_monitor, run.rate_hz, log, console))
                 ahead = None

@@ -12,6 +12,7 @@ name the promise it breaks. Each contract opens it beside stand-ins for the othe
 from labcrane.testing.captures import CaptureContract
 from labcrane.testing.commands import CommandContract
 from labcrane.testing.components import PluginContract, check_closes_after_failed_open, check_soon
+from labcrane.testing.estimates import EstimateContract
 from labcrane.testing.examinations import ExaminationContract
 from labcrane.testing.exporters import PARTICIPANT_TRIALS, ExporterContract, make_participant
 from labcrane.testing.kernels import KernelContract
@@ -48,6 +49,7 @@ __all__ = [
     "ControllerContract",
     "CueContract",
     "DynamicsContract",
+    "EstimateContract",
     "ExaminationContract",
     "ExporterContract",
     "FeedbackContract",

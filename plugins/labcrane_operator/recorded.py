@@ -37,7 +37,8 @@ class RecordedInput(InputDevice):
             raise ProtocolError(str(error), at=("session",)) from error
         recorded = record.streams["input"]
         # The hands of an assistant are not the operator's.
-        names = [name for name in map(str, recorded.data) if not name.startswith("assist.")]
+        others = ("assist.", "estimate.")
+        names = [name for name in map(str, recorded.data) if not name.startswith(others)]
         self.signals = signals_of(names, recorded.units)
         self._axes: FloatArray = recorded.data[names].to_numpy(np.float64)
         self._rate_hz = float(record.attrs["rate_hz"])

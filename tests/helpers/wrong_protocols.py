@@ -68,6 +68,13 @@ streams:
   brain: {type: EEG, source_id: cap-7, required: false}
 monitors:
   brain: {use: eeg_signal}
+estimates:
+  load:
+    use: band_power
+    stream: brain
+    fallback: {ratio: 1}
+    channels: [Fz]
+    per_channels: [Pz]
 sync: {}
 indicator: {}
 design:
@@ -347,6 +354,7 @@ OF_LAB = {
     ("streams",),
     ("monitors",),
     ("triggers",),
+    ("estimates",),
     ("input", "axes"),
     ("design", "groups"),
     ("design", "tracks"),

@@ -1,0 +1,171 @@
+"""The process of one estimate.
+
+It is started by a :class:`labcrane.processes.handle.ProcessHandle` with a
+:class:`labcrane.estimation.config.EstimateConfig` and ends when its parent does. It is told which
+stream the recorder has, by the properties of its description, and receives it by an inlet of its
+own. It reports the stream of its values (``sends``), that it lives (``beat``), and the reason for
+which it ends (``failed``).
+"""
+
+import math
+import sys
+import time
+from collections.abc import Mapping
+
+import numpy as np
+
+from labcrane.core.roles import Estimate
+from labcrane.core.settings import EstimateSettings
+from labcrane.errors import LabcraneError
+from labcrane.estimation.config import EstimateConfig
+from labcrane.monitoring.monitored_stream import signal_stream
+from labcrane.processes.parent import Parent
+from labcrane.protocol.estimated import STREAM, State
+from labcrane.protocol.streams import StreamNeed
+from labcrane.protocol.study import load
+from labcrane.recording.xdf.header import StreamHeader
+from labcrane.registry.registry import discover
+from labcrane.registry.traceback import told
+from labcrane.streams.newest import NewestSample
+from labcrane.streams.outlets import SampleOutlet, channel, check_clock, stream_info
+from labcrane.types import FloatArray
+
+PULL_S = 0.01
+BEAT_S = 0.5
+SILENT_S = 0.5
+"""After so long without samples the state is that no data come."""
+
+ANSWER_S = 1.0
+
+
+def run(config: EstimateConfig, parent: Parent) -> None:
+    """Estimate until the parent is gone; raises what the estimate raises."""
+    study = load(config.study, discover(study=config.study), recorded=config.recorded)
+    choice = study.choices[f"estimates.{config.name}"]
+    estimate, settings = choice.build(study.machine), study.estimates[config.name]
+    assert isinstance(estimate, Estimate)  # noqa: S101 - an offer of this role
+    check_clock()
+    outlet = _Outlet(config, settings)
+    parent.tell({"sends": outlet.description})
+    need = study.protocol.streams[settings.stream]
+    source: _Source | None = None
+    beaten = came = 0.0
+    try:
+        while not parent.gone.is_set():
+            parent.wait(PULL_S)
+            for wanted in parent.messages():
+                if source is not None:
+                    source.close()
+                source = _Source(wanted, need, estimate)
+            now = time.perf_counter()
+            if source is not None and len((new := source.new())[0]):
+                came = now
+                outlet.push(*new, estimate)
+            if now - beaten >= BEAT_S:
+                beaten = now
+                parent.tell({"beat": True})
+                if now - came > SILENT_S:
+                    outlet.push_nothing(now)
+    finally:
+        if source is not None:
+            source.close()
+        estimate.close()
+
+
+class _Source:
+    """The stream that an estimate is computed from, on our clock as far as that is known."""
+
+    def __init__(self, wanted: Mapping[str, str], need: StreamNeed, estimate: Estimate) -> None:
+        self._stream = NewestSample(wanted)
+        self._need, self._estimate = need, estimate
+        self._uid = ""
+        self._latency_s = 0.0
+
+    def new(self) -> tuple[FloatArray, FloatArray]:
+        """Return times and samples that have come since the last call."""
+        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
+        samples, stamps = self._stream.pull()
+        info = self._stream.info
+        nothing = np.empty(0), np.empty((0, 0))
+        if not stamps or info is None:
+            return nothing
+        if info.uid() != self._uid:
+            header = StreamHeader.from_xml(info.as_xml())
+            self._estimate.begin(signal_stream(header))
+            self._latency_s = self._need.treatment(header).latency_s
+        try:
+            offset = self._stream.time_correction(ANSWER_S)
+        except (pylsl.util.TimeoutError, pylsl.util.LostError):
+            return nothing  # times would be of another clock
+        if info.uid() != self._uid:
+            self._uid = info.uid()
+            return nothing  # the first answer about the clock takes a while: these are late
+        return np.array(stamps) + (offset - self._latency_s), np.array(samples, np.float64)
+
+    def close(self) -> None:
+        self._stream.close()
+
+
+class _Outlet:
+    """The stream of an estimate: values, first and last sample, and state, at the values' time."""
+
+    def __init__(self, config: EstimateConfig, settings: EstimateSettings) -> None:
+        columns = (*settings.values, "first", "last", "state")
+        self._size = len(settings.values)
+        name = STREAM + config.name
+        info = stream_info(
+            name, "Estimate", len(columns), "double64", rate_hz=0.0, source=config.source
+        )
+        for label in columns:
+            unit = "seconds" if label in {"first", "last"} else "none"
+            channel(info, label=label, unit=unit, type="Estimate")
+        self._outlet = SampleOutlet(info, len(columns))
+
+    @property
+    def description(self) -> str:
+        """The stream as XML."""
+        return self._outlet.description
+
+    def push(self, times: FloatArray, samples: FloatArray, estimate: Estimate) -> None:
+        """Send what an estimate computes from its next samples."""
+        with np.errstate(all="ignore"):  # sources send whatever they like
+            found = estimate.update(times, samples)
+        last = float(times[-1])
+        if found is None:
+            self._send(np.full(self._size, np.nan), last, math.nan, last, State.WARMING_UP)
+            return
+        values = np.array(found.values)
+        state = State.OK if np.isfinite(values).all() else State.NOT_A_NUMBER
+        self._send(values, found.time, found.first, last, state)
+
+    def push_nothing(self, now: float) -> None:
+        """Send that no data come."""
+        self._send(np.full(self._size, np.nan), now, math.nan, math.nan, State.NO_DATA)
+
+    def _send(
+        self, values: FloatArray, stamp: float, first: float, last: float, state: State
+    ) -> None:
+        self._outlet.push(np.array([*values, first, last, state]), stamp)
+
+
+def main() -> int:
+    """Run one estimate's process; return its exit status."""
+    parent = Parent()
+    if (config := parent.order()) is None:
+        return 0
+    try:
+        run(config, parent)
+    except LabcraneError as error:
+        parent.tell({"failed": str(error)})
+        return 1
+    except Exception as error:
+        parent.tell({"failed": told(error)})
+        raise  # a plugin's mistake: its author needs the traceback
+    finally:
+        parent.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
