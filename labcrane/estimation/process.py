@@ -33,7 +33,8 @@ from labcrane.types import FloatArray
 PULL_S = 0.01
 BEAT_S = 0.5
 SILENT_S = 0.5
-"""After so long without samples the state is that no data come."""
+"""After so long without samples the state is that no data come, but after three of a slow stream.
+A stream without a rate may pause for as long as it likes: its values become late."""
 
 ANSWER_S = 1.0
 
@@ -64,7 +65,7 @@ def run(config: EstimateConfig, parent: Parent) -> None:
             if now - beaten >= BEAT_S:
                 beaten = now
                 parent.tell({"beat": True})
-                if now - came > SILENT_S:
+                if now - came > (SILENT_S if source is None else source.silent_s):
                     outlet.push_nothing(now)
     finally:
         if source is not None:
@@ -80,6 +81,7 @@ class _Source:
         self._need, self._estimate = need, estimate
         self._uid = ""
         self._latency_s = 0.0
+        self.silent_s = SILENT_S
 
     def new(self) -> tuple[FloatArray, FloatArray]:
         """Return times and samples that have come since the last call."""
@@ -94,6 +96,8 @@ class _Source:
             header = StreamHeader.from_xml(info.as_xml())
             self._estimate.begin(signal_stream(header))
             self._latency_s = self._need.treatment(header).latency_s
+            rate_hz = header.rate_hz
+            self.silent_s = max(SILENT_S, 3.0 / rate_hz) if rate_hz else math.inf
         try:
             offset = self._stream.time_correction(ANSWER_S)
         except (pylsl.util.TimeoutError, pylsl.util.LostError):
