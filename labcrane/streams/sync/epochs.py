@@ -132,7 +132,6 @@ def _jumps(probes: FloatArray) -> list[int]:
     doubt = (probes[1:, RTT] + probes[:-1, RTT]) / 2
     change = np.diff(probes[:, OFFSET])
     far = np.abs(change) > JUMP_S + drift + doubt
-    far &= ~_slewed(change, np.abs(np.diff(measured)), doubt)
     far |= _alone(change, np.abs(np.diff(measured)), probes[:, RTT])
     return [int(k) + 1 for k in np.flatnonzero(far)]
 
@@ -148,21 +147,6 @@ def _alone(change: FloatArray, step: FloatArray, trips: FloatArray) -> npt.NDArr
     around = np.maximum(near[:-2], near[2:])
     clear = beyond > SMALL_S + WALK * step + (excess[1:] + excess[:-1]) / 2.0
     return np.asarray(clear & (around < ALONE * beyond), dtype=np.bool_)
-
-
-def _slewed(change: FloatArray, step: FloatArray, doubt: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return which changes belong to a slew: their neighbours change the same way, if less.
-
-    A clock that is set right by turning it faster does so for seconds. One that steps goes on
-    before and after as it did.
-    """
-    usual = float(np.median(change / np.maximum(step, 1e-3)))
-    beyond = change - usual * step
-    slow = np.abs(beyond) < FASTEST_SLEW * np.maximum(step, 1e-3)
-    clear = np.sign(beyond) * (np.abs(beyond) > 5e-5 + 1e-4 * step + 2.0 * doubt)
-    before, after = np.r_[0.0, clear[:-1]], np.r_[clear[1:], 0.0]
-    alike = (clear != 0.0) & ((before == clear) | (after == clear))
-    return np.asarray(slow & alike, dtype=np.bool_)
 
 
 def _without_strays(probes: FloatArray, jumps: list[int]) -> tuple[FloatArray, list[int]]:
