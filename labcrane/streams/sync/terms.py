@@ -15,11 +15,21 @@ The stated uncertainty is their sum, and nothing else: :func:`total`."""
 class Term(StrEnum):
     """Why a corrected time may be off."""
 
-    CLOCK = "clock"  # offset of its clock: probes and the curve through them, or arrivals alone
-    LAG = "lag"  # its clock or its program may be late, or ahead, by as much as arrivals allow
-    STAMPS = "stamps"  # its timestamps scatter about its samples, are cut, or stand still
-    LOSSES = "losses"  # which samples were lost, or to which side of a step one belongs
-    SHIFTS = "shifts"  # the delay before its timestamps, or its clock, changed
+    CLOCK = "clock"
+    LAG = "lag"
+    STAMPS = "stamps"
+    LOSSES = "losses"
+    SHIFTS = "shifts"
+
+
+MEANS = {
+    Term.CLOCK: "its clock's offset is known by probes and the curve through them, or by arrivals",
+    Term.LAG: "its clock or its program may be late, or ahead, by as much as arrivals allow",
+    Term.STAMPS: "its timestamps scatter about its samples, are cut, or stand still",
+    Term.LOSSES: "which samples were lost is not known, or to which side of a step one belongs",
+    Term.SHIFTS: "the delay before its timestamps, or its clock, changed",
+}
+"""What each says, in a sentence without its end."""
 
 
 def none_of(count: int) -> dict[str, FloatArray]:

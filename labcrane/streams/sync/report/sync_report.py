@@ -16,6 +16,7 @@ from labcrane.recording.journal import finite
 from labcrane.streams.sync.report.limits import Limits
 from labcrane.streams.sync.report.loop_back import LoopBack
 from labcrane.streams.sync.report.stream_report import StreamReport
+from labcrane.streams.sync.terms import MEANS
 from labcrane.types import FloatArray
 
 COLUMNS = (
@@ -120,12 +121,14 @@ class SyncReport:
         return [f"{f.verdict} {whose}{f.text}; {f.advice}" for whose, f in found]
 
     def details(self) -> list[str]:
-        """Return how each stream was found, what was done to its stamps, what stays unknown."""
-        return [
+        """Return what was done to each stream's stamps, what stays unknown, what terms mean."""
+        named = {name for one in self.streams for name in one.quality.made_of_s}
+        found = [
             f"{one.name}: {'; '.join(filter(None, (one.taken, *one.corrected, one.unknown)))}"
             for one in self.streams
             if one.samples
         ] + [f"{one.stream}: {one.in_words()}" for one in self.loop_back]
+        return found + [f"{name}: {means}" for name, means in MEANS.items() if name in named]
 
 
 def judge_loop(
