@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from labcrane.streams.sync.stamping import holes, levels, receipt, shifts, units, wander
 from labcrane.streams.sync.stamping.late_chunks import lost_before, lost_between, slope
+from labcrane.streams.sync.stamping.receipt import EQUAL_S, SAME
 from labcrane.types import FloatArray
 
 FEW = 20
@@ -34,10 +35,6 @@ STRAY_S, SHARP = 3e-4, 8.0
 
 WHOLE = 0.25
 """A step this close to whole periods has lost whole samples."""
-
-EQUAL_S = 3e-6
-SAME = 0.5
-"""Where this part of all steps is the same, stamps are computed and not taken."""
 
 EARLIER = 0.1
 """At least this part of chunks stamped when sent waited for less than the one before."""

@@ -38,6 +38,8 @@ SHORTEST_POLL_S = 2e-3
 SOME = 0.01
 EQUAL_S = 3e-6
 SAME = 0.5
+"""Where this part of all steps is the same, stamps are computed and not taken."""
+
 PHASES = 400
 """So many polls show the phases of a while."""
 
