@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from needs import needs
+from programs import ran
 
 # At the end: processes that a test starts import labcrane from where this one did.
 sys.path.append(str(Path(__file__).parents[1]))
@@ -146,10 +147,10 @@ def marked(subject: str) -> object:
     "subject", [marked(each) for each in importlib.import_module("benchmarks.__main__").SUBJECTS]
 )
 def test_every_benchmark_can_be_run(subject: str) -> None:
-    done = subprocess.run(
+    done = ran(
         [sys.executable, "-m", "benchmarks", "--brief", "--only", subject],
-        cwd=Path(__file__).parents[1], capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=Path(__file__).parents[1],
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert f"| {subject} | " in done.stdout
     assert done.stdout.endswith("all could be run\n")

@@ -2,9 +2,7 @@
 
 import csv
 import math
-import os
 import re
-import subprocess
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date
@@ -13,9 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from needs import need
+from programs import ran
 
+from labcrane import LabcraneError, RecordingError, open_recording
+from labcrane.analysis import find_cohort
 from labcrane.analysis.advice import familiarity, fatigue, suggest
-from labcrane.analysis.cohort import find_cohort
 from labcrane.analysis.report.workbook import advice, write_workbook
 from labcrane.analysis.scoring.indicator import Indicator, Performance, indicate
 from labcrane.analysis.scoring.operator_tests import (
@@ -27,13 +27,11 @@ from labcrane.analysis.scoring.operator_tests import (
 from labcrane.analysis.scoring.settings import IndicatorSettings, Weights
 from labcrane.cli.app import main
 from labcrane.cli.commands.results import LEFT_OUT
-from labcrane.core.records import Event
-from labcrane.errors import LabcraneError, RecordingError
+from labcrane.core import Event
 from labcrane.participants.enrolment import exclude
 from labcrane.participants.folders import Places
 from labcrane.participants.register import Entry, changed
 from labcrane.recording.journal import Column, SessionJournal
-from labcrane.recording.participant_file.reader import open_recording
 from labcrane.recording.participant_file.writer import consolidate
 
 LITERAL = IndicatorSettings()
@@ -329,13 +327,10 @@ def converted(book: Path, sheet: int) -> list[list[str]]:
     how = f"csv:Text - txt - csv (StarCalc):44,34,76,1,,0,false,true,false,false,false,{sheet}"
     home = f"-env:UserInstallation={(own / 'settings').as_uri()}"
     into = ["--headless", "--convert-to", how, "--outdir", str(book.parent), str(book)]
-    done = subprocess.run(
+    done = ran(
         ["soffice", home, *into],
-        env={**os.environ, "HOME": str(own), "TMPDIR": str(own / "temporary")},
-        capture_output=True,
-        text=True,
+        env={"HOME": str(own), "TMPDIR": str(own / "temporary")},
         timeout=240,
-        check=False,
     )
     assert done.returncode == 0, f"soffice ended with {done.returncode}: {done.stdout}{done.stderr}"
     [text] = book.parent.glob(f"{book.stem}-*.csv")

@@ -9,10 +9,10 @@ import pytest
 from pydantic import ValidationError
 from rehearsal import SHORT, said_of
 
+from labcrane import ProtocolError
 from labcrane.approval.materials import materials
 from labcrane.design.plan import plan_session
 from labcrane.design.quest_plus import grid
-from labcrane.errors import ProtocolError
 from labcrane.files.units import KINDS, in_unit
 from labcrane.protocol.questions import PLAUSIBLE, questions
 from labcrane.protocol.streams import TimeLimits

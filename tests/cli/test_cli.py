@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 from needs import needs
-from rehearsal import SHORT
+from programs import ran
+from rehearsal import SHORT, simulated_file
 from rich.console import Console
 
 import labcrane
@@ -21,14 +22,7 @@ AIMING = ROOT / "protocols" / "aiming" / "protocol.yaml"
 def labcrane_command(
     *arguments: str, cwd: Path, said: str = ""
 ) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "labcrane", *arguments],
-        cwd=cwd,
-        input=said,
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-    )
+    return ran([sys.executable, "-m", "labcrane", *arguments], cwd=cwd, input=said)
 
 
 @pytest.mark.slow
@@ -68,7 +62,7 @@ def command_without(modules: list[str], *arguments: str, cwd: Path) -> str:
     hidden = f"import sys; sys.modules.update(dict.fromkeys({modules!r}))"
     program = f"{hidden}; from labcrane.cli.app import main; sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", program, *arguments]
-    done = subprocess.run(command, cwd=cwd, capture_output=True, encoding="utf-8", check=False)
+    done = ran(command, cwd=cwd)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -102,9 +96,7 @@ def test_fast_without_simulate_is_refused(
 @pytest.mark.slow
 def test_lines_of_a_pipe_are_orders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # A recorded operator needs no joystick, and is waited for like a person.
-    (tmp_path / "study.yaml").write_text(SHORT, encoding="utf-8")
-    simulate = ["run", "study.yaml", "--participant", "P001", "--simulate", "--fast"]
-    assert labcrane_command(*simulate, cwd=tmp_path).returncode == 0
+    simulated_file(tmp_path, SHORT)
     recorded = "{use: recorded, file: data/P001-SIMULATED/P001-SIMULATED.h5}"
     (tmp_path / "again.yaml").write_text(
         SHORT.replace("{use: dual_joystick}", recorded), encoding="utf-8"

@@ -1,11 +1,10 @@
 """What a shell is told when the user presses the tabulator."""
 
-import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from programs import ran
 
 
 @pytest.mark.parametrize(
@@ -16,7 +15,5 @@ def test_commands_are_completed_those_of_plugins_too(typed: str, completed: str)
     program = Path(sys.executable).with_name("labcrane")
     asked = {"_LABCRANE_COMPLETE": "complete_bash", "COMP_WORDS": typed}
     asked["COMP_CWORD"] = str(len(typed.split()) - 1)
-    done = subprocess.run(
-        [program], env={**os.environ, **asked}, capture_output=True, encoding="utf-8", check=True
-    )
+    done = ran([program], env=asked, check=True)
     assert done.stdout.split() == [completed]

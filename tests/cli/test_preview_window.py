@@ -9,6 +9,7 @@ import numpy as np
 import pylsl
 import pytest
 from needs import GRAPHICS, needs
+from programs import ran
 from rehearsal import SHORT
 from windows import an_x_server
 
@@ -91,12 +92,9 @@ def test_without_a_display_it_is_written_to_files(
 @pytest.mark.slow
 def test_where_nothing_can_be_shown_it_says_so(tmp_path: Path) -> None:
     protocol, _ = a_protocol(tmp_path)
-    done = subprocess.run(
+    done = ran(
         [sys.executable, "-m", "labcrane", "feedback", "preview", str(protocol)],
-        env={**os.environ, "DISPLAY": ":4711", "JACK_DEFAULT_SERVER": "nobody"},
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
+        env={"DISPLAY": ":4711", "JACK_DEFAULT_SERVER": "nobody"},
     )
     assert done.returncode == 1
     assert "nothing can draw here: neither OpenGL nor the software renderer" in done.stdout

@@ -12,7 +12,8 @@ from random import Random
 
 import pytest
 from needs import needs
-from rehearsal import SHORT
+from programs import ran
+from rehearsal import SHORT, simulated_file
 from rich.console import Console
 
 from labcrane import open_recording
@@ -64,10 +65,7 @@ class TerminalUser:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A study whose operator is a recorded one, who is waited for like a person."""
-    (tmp_path / "first.yaml").write_text(SHORT, encoding="utf-8")
-    simulate = ["run", "first.yaml", "--participant", "P001", "--simulate", "--fast"]
-    command = [sys.executable, "-m", "labcrane", *simulate]
-    subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
+    simulated_file(tmp_path, SHORT)
     recorded = "{use: recorded, file: data/P001-SIMULATED/P001-SIMULATED.h5}"
     (tmp_path / "study.yaml").write_text(
         SHORT.replace("{use: dual_joystick}", recorded), encoding="utf-8"
@@ -75,14 +73,20 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.slow
-@needs("terminals")
-def test_keys_start_pause_note_flag_and_end_a_session(folder: Path) -> None:
+def in_a_block(folder: Path) -> TerminalUser:
+    """Start a pilot session, and its first block."""
     command = [sys.executable, "-m", "labcrane", "run", "study.yaml"]
     user = TerminalUser([*command, "--participant", "P002", "--local", "--pilot"], folder)
     user.until("space to start")
     user.press(" ")
     user.until("Block 1 began")
+    return user
+
+
+@pytest.mark.slow
+@needs("terminals")
+def test_keys_start_pause_note_flag_and_end_a_session(folder: Path) -> None:
+    user = in_a_block(folder)
     user.press("p")
     user.until("Paused by you")
     user.press("nhustet zwei Malx\x7f, ächzt\n")
@@ -110,11 +114,7 @@ def test_keys_start_pause_note_flag_and_end_a_session(folder: Path) -> None:
 @pytest.mark.slow
 @needs("terminals")
 def test_an_interrupt_from_the_keyboard_ends_the_session_in_order(folder: Path) -> None:
-    command = [sys.executable, "-m", "labcrane", "run", "study.yaml"]
-    user = TerminalUser([*command, "--participant", "P002", "--local", "--pilot"], folder)
-    user.until("space to start")
-    user.press(" ")
-    user.until("Block 1 began")
+    user = in_a_block(folder)
     user.process.send_signal(2)
     assert user.leave() == 0
     session = open_recording(folder / "data" / "P002-PILOT" / "P002-PILOT.h5").session(1)
@@ -262,11 +262,12 @@ def test_without_terminal_and_page_a_session_ends_where_it_waits(
 @pytest.mark.slow
 def test_a_session_that_nobody_can_start_is_kept_to_be_gone_on_with(folder: Path) -> None:
     command = [sys.executable, "-m", "labcrane", "run", "study.yaml", "--no-page"]
-    done = subprocess.run(
+    done = ran(
         [*command, "--participant", "P002", "--local", "--pilot"],
-        cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
         timeout=120,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     assert "to continue, run: labcrane resume" in " ".join(done.stdout.split())
     session = open_recording(folder / "data" / "P002-PILOT" / "P002-PILOT.h5").session(1)

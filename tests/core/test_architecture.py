@@ -3,7 +3,6 @@
 import ast
 import json
 import re
-import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from pathlib import Path
 import grimp
 import pytest
 from needs import needs
+from programs import ran
 
 import labcrane
 
@@ -112,12 +112,7 @@ def loaded_by(*arguments: str) -> set[str]:
         "status = main(json.loads(sys.argv[1]))\n"
         "print(json.dumps([status, sorted(sys.modules)]))\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program, json.dumps(arguments)],
-        capture_output=True,
-        encoding="utf-8",
-        check=True,
-    )
+    done = ran([sys.executable, "-c", program, json.dumps(arguments)], check=True)
     status, modules = json.loads(done.stdout.splitlines()[-1])
     assert status == 0, done.stdout + done.stderr
     return set(modules)

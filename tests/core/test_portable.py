@@ -1,12 +1,12 @@
 """Sources hold nothing that only some systems have, but where the others have their own way."""
 
 import ast
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from programs import ran
 
 ROOT = Path(__file__).parents[2]
 SOURCES = sorted(
@@ -156,5 +156,5 @@ def test_no_path_is_opened_in_the_encoding_of_the_country() -> None:
     # It is a rule on trial yet: chosen with the others, it would change what they say.
     rule = ["ruff", "check", "--preview", "--select", "PLW1514", "--output-format", "concise"]
     command = [sys.executable, "-m", *rule, "labcrane", "plugins", "benchmarks", "examples"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, encoding="utf-8", check=False)
+    done = ran(command, cwd=ROOT)
     assert done.stdout == "All checks passed!\n"

@@ -6,15 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from needs import needs
+from rehearsal import loaded
 from scipy.stats import norm
 
+from labcrane import ProtocolError
 from labcrane.design.quest_plus import THRESHOLDS
 from labcrane.design.tracks import PlannedTrack, Response, check_carried, standing
 from labcrane.design.up_down import climb, settles_at
-from labcrane.errors import ProtocolError
-from labcrane.protocol.study import load
 from labcrane.protocol.tracks import QuestPlus, Track, UpDown
-from labcrane.registry.registry import discover
 
 TEN = {f"l{at}": float(at) for at in range(10)}
 QUEST = Track(factor="f", levels=TEN, quest_plus=QuestPlus(spreads=(0.5, 1.0, 2.0)))
@@ -182,7 +181,7 @@ sessions: [{name: one, steps: [{block: {task: aiming, track: reach}}]}]
 def test_the_study_of_these_mistakes_is_fine_without_them(tmp_path: Path) -> None:
     path = tmp_path / "protocol.yaml"
     path.write_text(HEAD)
-    assert load(path, discover()).protocol.design.tracks["reach"].rounds == 40
+    assert loaded(path).protocol.design.tracks["reach"].rounds == 40
 
 
 @pytest.mark.parametrize(
@@ -230,7 +229,7 @@ def test_what_cannot_be_is_refused_with_its_line(
     path = tmp_path / "protocol.yaml"
     path.write_text(HEAD.replace(old, new))
     with pytest.raises(ProtocolError, match=message):
-        load(path, discover())
+        loaded(path)
 
 
 def test_a_round_under_way_keeps_its_level(tmp_path: Path) -> None:
@@ -238,7 +237,7 @@ def test_a_round_under_way_keeps_its_level(tmp_path: Path) -> None:
 
     path = tmp_path / "protocol.yaml"
     path.write_text(HEAD)
-    (block,) = plan_session(load(path, discover()), "P001", 1).blocks
+    (block,) = plan_session(loaded(path), "P001", 1).blocks
     track = block.track
     assert isinstance(track, PlannedTrack)
     assert (track.size, track.count, len(block.trials)) == (3, 120, 120)
@@ -266,7 +265,7 @@ def test_no_table_of_quest_plus_is_made_at_a_choice(
     quest_plus.grid.cache_clear()
     path = tmp_path / "protocol.yaml"
     path.write_text(HEAD.replace("up_down: {}", "quest_plus: {spreads: [0.5, 1]}"))
-    (block,) = plan_session(load(path, discover()), "P001", 1).blocks
+    (block,) = plan_session(loaded(path), "P001", 1).blocks
     made = quest_plus.grid.cache_info().misses
     assert made == 1
 

@@ -38,13 +38,12 @@ from xml.etree import ElementTree
 
 from docs.person import Person
 from fresh_environment import environment
+from rehearsal import loaded
 from ruamel.yaml import YAML
 from simple_crane import CRANE
 from windows import an_x_server
 
 from labcrane.cli.app import main
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 
 ROOT = Path(__file__).parents[2]
 
@@ -283,7 +282,7 @@ class Reader:
         path = self._folder / "page.yaml"
         with path.open("w") as file:
             yaml.dump(part, file)
-        study = load(path, discover())
+        study = loaded(path)
         for choice in (*study.views.values(), *study.sounds.values(), *study.cues.values()):
             choice.build(study.machine)
 

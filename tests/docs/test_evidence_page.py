@@ -1,15 +1,14 @@
 """Pages say of systems and wheels what the record of the stages says, and nothing else."""
 
 import json
-import os
 import re
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
 from docs.page import ROOT
 from gate_program import gate_program
+from programs import ran
 
 EVIDENCE = gate_program("evidence")
 RECORD = json.loads((ROOT / EVIDENCE.DATA).read_text(encoding="utf-8"))
@@ -92,12 +91,9 @@ def test_every_stage_of_the_nightly_run_has_a_row() -> None:
 
 def test_a_python_that_is_not_there_is_noted_as_not_tried_with_the_reason(tmp_path: Path) -> None:
     runs = tmp_path / "runs"
-    done = subprocess.run(
+    done = ran(
         ["bash", "-euo", "pipefail", "-c", ". .ci/stages; installed_on 3.99; on_python 3.99"],
-        env={**os.environ, "LABCRANE_RUNS": str(runs)},
-        capture_output=True,
-        text=True,
-        check=False,
+        env={"LABCRANE_RUNS": str(runs)},
     )
     assert (done.returncode, done.stderr) == (0, "")
     (line,) = EVIDENCE.lines_of(runs)

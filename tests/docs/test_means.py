@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from docs.page import BASE, PROGRAMS, ROOT, Block, blocks
 from needs import need
+from programs import ran
 
 TASK = "{use: aiming, distances: [2], movements: 2}"
 OTHER = "{use: aiming, distances: [1.5, 2.5], movements: 4, limit_s: 7.6}"
@@ -75,7 +76,7 @@ def test_a_mean_on_a_page_is_of_counted_movements(
     program, options, name = PROGRAMS.get(language, (sys.executable, "", "page.py"))
     (tmp_path / name).write_text("\n".join(block.text for block in found), encoding="utf-8")
     command = [program, *options.split(), name]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, check=True, encoding="utf-8")
+    done = ran(command, cwd=tmp_path, check=True)
     by_distance, of_all = true_means(participant)
     printed = [float(number) for number in re.findall(r"\d+\.\d+", done.stdout)]
     for mean in [of_all] if language == "octave" else by_distance.values():

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from needs import needs
 
-from labcrane.core.findings import Finding, Verdict
+from labcrane.core import Finding, Verdict
 from labcrane.doctor import clock, disk, scheduling
 from labcrane.doctor.clock import ClockReading
 

@@ -1,7 +1,5 @@
 """The looks at CAN, displays and sound, with an adapter on a pty, Xvfb and ALSA's null device."""
 
-import os
-import subprocess
 import sys
 import threading
 from collections.abc import Iterator
@@ -9,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from needs import GRAPHICS, needs
+from programs import ran
 from rehearsal import SHORT
 from slcan_adapter import SlcanAdapter
 from windows import an_x_server
@@ -149,13 +148,7 @@ def in_a_process(plugin: str, **environment: str) -> str:
         "(offer,) = labcrane_feedback()\n"
         "for one in offer.examine(offer.settings(), None): print(one.verdict, one.text, one.advice)"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = ran([sys.executable, "-c", code], env=environment)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -200,7 +193,7 @@ def test_a_sound_device_is_opened_without_being_started(
         "for one in offer.examine(offer.settings(), None): print(one.verdict, one.text)"
     )
     monkeypatch.setenv("ALSA_CONFIG_PATH", null_device(tmp_path))
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = ran([sys.executable, "-c", code], check=True)
     assert "touched" not in done.stdout
     assert "PASS sound device" in done.stdout
 

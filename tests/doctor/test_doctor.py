@@ -11,13 +11,13 @@ import pytest
 from rehearsal import SHORT, ScriptedConsole
 
 import labcrane
+from labcrane import RecordingError
 from labcrane.cli.app import main
-from labcrane.core.findings import Finding, Verdict
+from labcrane.core import Finding, Verdict
 from labcrane.doctor import check_process, components
 from labcrane.doctor.checks import examine, keep_apart
 from labcrane.doctor.components import ExaminedPart, of_everything, of_study, unexamined
 from labcrane.doctor.report import Check, diagnosis, keep, latest
-from labcrane.errors import RecordingError
 from labcrane.processes.handle import ProcessHandle
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover

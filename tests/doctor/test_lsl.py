@@ -2,7 +2,6 @@
 
 import os
 import socket
-import subprocess
 import sys
 import threading
 from collections.abc import Iterator
@@ -12,9 +11,10 @@ from xml.etree import ElementTree
 
 import pylsl
 import pytest
+from programs import ran
 from recording.test_full_disk import needs_mounts
 
-from labcrane.core.findings import Finding, Verdict
+from labcrane.core import Finding, Verdict
 from labcrane.doctor import lsl
 from labcrane.streams.known_programs import KNOWN
 from labcrane.streams.network import free_ports, port_range
@@ -178,11 +178,8 @@ def test_our_own_stream_is_not_found_when_nothing_gets_through() -> None:
         "from labcrane.doctor import lsl\n"
         "for one in lsl.examine(): print(one.verdict, one.text, '|', one.advice)"
     )
-    done = subprocess.run(
-        ["unshare", "--user", "--map-root-user", "--net", sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
+    done = ran(
+        ["unshare", "--user", "--map-root-user", "--net", sys.executable, "-c", code], check=True
     )
     assert done.stdout.startswith("FAIL a test stream is not found (UDP 16571) | the fire")
 

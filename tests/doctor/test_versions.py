@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pylsl
 import pytest
+from programs import ran
 
 from labcrane.doctor import versions
 
@@ -32,9 +33,7 @@ def test_an_installation_without_liblsl_says_so(pylsl_py: str, said: str, tmp_pa
         "import sys; sys.path.insert(0, '.'); from labcrane.doctor.versions import versions; "
         "print(*versions())"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
+    done = ran([sys.executable, "-c", program], cwd=tmp_path, check=True)
     assert said in done.stdout
 
 
@@ -57,9 +56,7 @@ def test_a_clone_names_its_commit_and_whether_it_was_changed(
     (tmp_path / "loop.py").write_text("first")
     for words in (("init", "-q"), ("add", "."), ("commit", "-qm", "first"), ("tag", "v1")):
         subprocess.run([*GIT, str(tmp_path), *words], check=True)
-    head = subprocess.run(
-        [*GIT, str(tmp_path), "rev-parse", "HEAD"], check=True, capture_output=True, text=True
-    ).stdout
+    head = ran([*GIT, str(tmp_path), "rev-parse", "HEAD"], check=True).stdout
     assert versions.commit(tmp_path) == f", commit {head[:12]}"
     (tmp_path / "loop.py").write_text("second")
     assert versions.commit(tmp_path) == f", commit {head[:12]}-dirty"

@@ -4,7 +4,7 @@ from pathlib import PureWindowsPath
 
 import pytest
 
-from labcrane.core.findings import Finding, Verdict
+from labcrane.core import Finding, Verdict
 from labcrane.doctor import windows
 
 PYTHON = r"C:\lab\.venv\Scripts\python.exe"

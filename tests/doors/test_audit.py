@@ -1,11 +1,11 @@
 """The gate's look at known vulnerabilities: found, none, or said not to have been made."""
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from programs import ran
 
 AUDIT = Path(__file__).parents[2] / ".ci" / "audit"
 FINE = {"name": "numpy", "version": "2.0", "vulns": []}
@@ -39,6 +39,6 @@ cat {tmp_path}/answer >"$2"
 exit 1
 """)
     program.chmod(0o755)
-    done = subprocess.run([AUDIT, tmp_path / "python"], capture_output=True, text=True, check=False)
+    done = ran([AUDIT, tmp_path / "python"])
     assert done.returncode == status, done.stdout + done.stderr
     assert said in done.stdout + done.stderr

@@ -8,6 +8,7 @@ from typing import Any
 
 import h5py
 import pytest
+from rehearsal import simulated_file
 from results.recorded import STUDY, record, study
 
 from labcrane import RecordingError, open_recording
@@ -117,12 +118,7 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("own")
     (root / "plugins").mkdir()
     (root / "plugins" / "own.py").write_text(CUE, encoding="utf-8")
-    text = STUDY.replace("tasks:", "feedback: {own: {use: own_cue}}\ntasks:")
-    protocol = root / "study.yaml"
-    protocol.write_text(text, encoding="utf-8")
-    words = ["--participant", "P001", "--simulate", "--fast", "--data", str(root / "data")]
-    assert main(["run", str(protocol), *words]) == 0
-    return root / "data" / "P001-SIMULATED" / "P001-SIMULATED.h5"
+    return simulated_file(root, STUDY.replace("tasks:", "feedback: {own: {use: own_cue}}\ntasks:"))
 
 
 def test_the_code_of_a_study_is_run_when_somebody_says_so(

@@ -14,12 +14,12 @@ from doors.test_signals import FLOATS, VALVES, Newest
 from rehearsal import SHORT, a_study
 
 from labcrane import LabcraneError
-from labcrane.core.items import AnswerError
+from labcrane.core import AnswerError
 from labcrane.files.yaml import parse_yaml
 from labcrane.limits import LIMITS, LimitError
 from labcrane.machines import MeshError, read_surface
 from labcrane.protocol.study import Study
-from labcrane.recording.xdf.header import StreamHeader
+from labcrane.recording import StreamHeader
 from labcrane.recording.xdf.reader import read_xdf
 from labcrane.session.commands import (
     Command,

@@ -6,7 +6,7 @@ import pytest
 
 from labcrane import RecordingError
 from labcrane.limits import LIMITS
-from labcrane.recording.xdf.header import StreamHeader
+from labcrane.recording import StreamHeader
 
 MOST, DEEPEST = LIMITS["stream header"].most, LIMITS["stream header"].depth
 CHANNELS = LIMITS["stream channels"].most

@@ -4,6 +4,7 @@ import asyncio
 import http.client
 import ssl
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -176,10 +177,8 @@ def test_an_order_waits_for_one_page_and_not_for_all_that_are_asked_for() -> Non
             each.cancel()
         await asyncio.gather(*loads, return_exceptions=True)
 
-    try:
+    with closing(loop):
         loop.run_until_complete(attacked())
-    finally:
-        loop.close()
     assert len(made) == 60
     assert max(waits) <= PAGE_S + 1e-9
     assert made[-1] == pytest.approx((2 * 60 - 1) * PAGE_S)

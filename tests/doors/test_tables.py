@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from labcrane import LabcraneError, ProtocolError, RecordingError
-from labcrane.files.table import read_csv_text
+from labcrane.core import read_csv_text
 from labcrane.limits import LIMITS
 from labcrane_bids.dataset import people_table
 from labcrane_dmd.fit.recordings import read_recordings

@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rehearsal import SHORT, a_study, rehearse
 
-from labcrane.core.items import AnswerError, Item
+from labcrane.core import AnswerError, Item
 from labcrane.limits import LIMITS, LimitError, check_text, read_json
 from labcrane.participants.personal_data import personal
 from labcrane.protocol.study import Study

@@ -8,8 +8,8 @@ from rehearsal import ScriptedConsole
 
 from labcrane import open_recording
 from labcrane.protocol.study import load
+from labcrane.recording import SessionRecord
 from labcrane.recording.frame_log import FrameLog
-from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.registry.registry import discover
 from labcrane.session import session as session_module
 from labcrane.session.commands import Command, Order

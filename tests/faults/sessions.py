@@ -14,7 +14,11 @@ from typing import Any
 
 import h5py
 import psutil
+from rehearsal import simulated_file
 from simple_crane import FORM
+
+from labcrane import open_recording
+from labcrane.recording import SessionRecord
 
 STUDY = (
     """\
@@ -53,13 +57,33 @@ def labcrane(*arguments: object, **options: object) -> "subprocess.Popen[str]":
     )
 
 
+def finished(process: "subprocess.Popen[str]") -> str:
+    """Wait for a process that ends without an error; return what it has said."""
+    said = process.communicate(timeout=240)[0]
+    assert process.returncode == 0, said
+    return said
+
+
+def killed_and_resumed(folder: Path, study: str, enough: float) -> SessionRecord:
+    """Kill a simulated session whose journal has so many bytes; return what resuming it left."""
+    protocol, data = folder / "study.yaml", folder / "data"
+    protocol.write_text(study)
+    who = ("--participant", "P001", "--simulate", "--data", data)
+    launcher = labcrane("run", protocol, *who)
+    journal = data / "P001-SIMULATED" / "ses-01_run.xdf"
+    wait_for(lambda: journal.exists() and journal.stat().st_size > enough)
+    victim = session_process(launcher)
+    assert victim is not None
+    victim.kill()
+    launcher.communicate(timeout=240)
+    finished(labcrane("resume", protocol, *who))
+    return open_recording(data / "P001-SIMULATED" / "P001-SIMULATED.h5").session(1)
+
+
 def put_recorded(folder: Path, needs: str, *, limit_s: int, **on_fault: str) -> None:
     """Write a study whose controls are those of a simulated session, which is run before."""
     text = STUDY.format(study=unique(folder.name))
-    (folder / "first.yaml").write_text(text)
-    labcrane(
-        "run", "first.yaml", "--participant", "P001", "--simulate", "--fast", cwd=folder
-    ).communicate()
+    simulated_file(folder, text)
     recorded = "{use: recorded, file: data/P001-SIMULATED/P001-SIMULATED.h5}"
     text = text.replace("{use: dual_joystick}", recorded)
     text = text.replace("limit_s: 0.3", f"limit_s: {limit_s}")

@@ -4,10 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from faults.sessions import labcrane, session_process, wait_for
+from faults.sessions import killed_and_resumed
 from simple_crane import CRANE
-
-from labcrane import open_recording
 
 STUDY = (
     """\
@@ -32,20 +30,7 @@ on_fault: {session_died: redo_trial}
 def test_a_killed_session_is_resumed_with_its_share_and_every_tick_is_the_blend(
     tmp_path: Path,
 ) -> None:
-    protocol, data = tmp_path / "study.yaml", tmp_path / "data"
-    protocol.write_text(STUDY)
-    who = ("--participant", "P001", "--simulate", "--data", data)
-    launcher = labcrane("run", protocol, *who)
-    journal = data / "P001-SIMULATED" / "ses-01_run.xdf"
-    wait_for(lambda: journal.exists() and journal.stat().st_size > 5.0 * 240 * 8 * 75)
-    victim = session_process(launcher)
-    assert victim is not None
-    victim.kill()
-    launcher.communicate(timeout=240)
-    resumed = labcrane("resume", protocol, *who)
-    said = resumed.communicate(timeout=240)[0]
-    assert resumed.returncode == 0, said
-    session = open_recording(data / "P001-SIMULATED" / "P001-SIMULATED.h5").session(1)
+    session = killed_and_resumed(tmp_path, STUDY, 5.0 * 240 * 8 * 75)
     assert set(session.events["part"]) == {1, 2}
     assert (session.trials["outcome"] == "success").sum() == 4
     loop, command = (session.streams[name].data for name in ("loop", "command"))

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from faults.sessions import labcrane, session_process, wait_for
+from faults.sessions import killed_and_resumed
 from simple_crane import CRANE
 
-from labcrane import open_recording
 from labcrane.analysis import responses
 
 STUDY = (
@@ -40,21 +39,8 @@ SECONDS = 12.0
 def test_a_block_that_is_killed_and_resumed_keeps_its_stimuli_and_their_intervals(
     tmp_path: Path,
 ) -> None:
-    protocol, data = tmp_path / "study.yaml", tmp_path / "data"
-    protocol.write_text(STUDY)
-    who = ("--participant", "P001", "--simulate", "--data", data)
-    launcher = labcrane("run", protocol, *who)
-    journal = data / "P001-SIMULATED" / "ses-01_run.xdf"
     a_second = 240 * 8 * 55  # bytes, about
-    wait_for(lambda: journal.exists() and journal.stat().st_size > SECONDS * a_second)
-    victim = session_process(launcher)
-    assert victim is not None
-    victim.kill()
-    launcher.communicate(timeout=240)
-    resumed = labcrane("resume", protocol, *who)
-    said = resumed.communicate(timeout=240)[0]
-    assert resumed.returncode == 0, said
-    session = open_recording(data / "P001-SIMULATED" / "P001-SIMULATED.h5").session(1)
+    session = killed_and_resumed(tmp_path, STUDY, SECONDS * a_second)
     found, events = responses(session), session.events
     given = events[events["name"] == "drt.stimulus"]
     assert set(given["part"]) == {1, 2}

@@ -12,9 +12,9 @@ from needs import GRAPHICS, needs
 from simple_crane import FORM
 
 import labcrane as lab
-from labcrane.core.records import Event
+from labcrane.core import Event
 from labcrane.launcher.launcher import Launcher
-from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.recording import SessionRecord
 from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.visit import visit_of
 

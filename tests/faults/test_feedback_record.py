@@ -8,7 +8,7 @@ from faults.sessions import unique
 from simple_crane import FORM
 
 import labcrane as lab
-from labcrane.core.records import Event
+from labcrane.core import Event
 from labcrane.session.commands import Command, Order
 
 STUDY = (

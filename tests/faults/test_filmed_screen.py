@@ -14,7 +14,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from faults.sessions import labcrane, wait_for
+from faults.sessions import finished, labcrane, wait_for
 from faults.test_filmed_session import STUDY, WHO, check_files, size
 from needs import GRAPHICS, needs
 
@@ -167,9 +167,7 @@ def test_a_session_measures_how_late_its_own_view_is_in_the_film(tmp_path: Path)
     protocol.write_text(plain + FLASHED)
     with x_server() as (display, _):
         env = {**os.environ, "DISPLAY": display}
-        launcher = labcrane("run", protocol, *WHO, data, "--feedback", env=env)
-        said = launcher.communicate(timeout=240)[0]
-    assert launcher.returncode == 0, said
+        said = finished(labcrane("run", protocol, *WHO, data, "--feedback", env=env))
     folder = data / "P001-SIMULATED"
     session = open_recording(folder / f"{folder.name}.h5").session(1)
     (found,) = session.sync_report["loop_back"]
@@ -196,8 +194,7 @@ def test_a_screen_that_goes_and_comes_back_is_recorded_again(tmp_path: Path) -> 
         server.send_signal(signal.SIGKILL)
         server.wait()
     with x_server(display):
-        said = launcher.communicate(timeout=240)[0]
-    assert launcher.returncode == 0, said
+        said = finished(launcher)
     assert "recording screen: failed: " in said
     assert "recording screen: is written to ses-01_screen.2.mkv" in said
     check_files(folder, "screen", files=2)

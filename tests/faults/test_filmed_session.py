@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-from faults.sessions import labcrane, session_process, wait_for
+from faults.sessions import finished, labcrane, session_process, wait_for
 from needs import needs
 from plugins.test_film import frames_in
 from recording.test_full_disk import in_namespace
@@ -95,8 +95,7 @@ def test_recordings_that_are_killed_go_on_in_the_next_file(tmp_path: Path) -> No
         victim = filming(launcher, name)
         assert victim is not None
         victim.kill()
-    said = launcher.communicate(timeout=240)[0]
-    assert launcher.returncode == 0, said
+    said = finished(launcher)
     assert "recording face: failed: its process ended with exit code -9" in said
     assert "recording face: is written to ses-01_face.2.mkv" in said
     for name in ("face", "room"):
@@ -117,9 +116,7 @@ def test_a_session_that_is_killed_and_resumed_is_filmed_in_both_parts(tmp_path: 
     wait_for(lambda: size(folder / "ses-01_run.xdf") > 100_000)
     session_process(launcher).kill()
     launcher.communicate(timeout=240)
-    resumed = labcrane("resume", protocol, *WHO, data)
-    said = resumed.communicate(timeout=240)[0]
-    assert resumed.returncode == 0, said
+    finished(labcrane("resume", protocol, *WHO, data))
     for name in ("face", "room"):
         check_files(folder, name, files=2)
 
@@ -128,7 +125,7 @@ FILLED = """
 import sys
 import time
 from pathlib import Path
-from faults.sessions import labcrane, wait_for
+from faults.sessions import finished, labcrane, wait_for
 from faults.test_filmed_session import STUDY, WHO, check_files, size
 
 disk = Path(sys.argv[1])
@@ -144,8 +141,7 @@ with ballast.open("wb", buffering=0) as file:
         pass
 time.sleep(4.0)  # the disk is full for so long, whatever else goes on
 ballast.unlink()
-said = launcher.communicate(timeout=240)[0]
-assert launcher.returncode == 0, said
+said = finished(launcher)
 assert "MB are free at " in said, said
 assert "and a recording leaves 200 MB for the session itself" in said, said
 assert "recording face: is written to ses-01_face.2.mkv" in said, said

@@ -13,6 +13,7 @@ from faults.sessions import (
     STUDY,
     a_witness,
     contents,
+    finished,
     kill_all,
     labcrane,
     run_second,
@@ -43,9 +44,7 @@ def killed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     protocol.write_text(STUDY.format(study=study))
     prepared = folder / "prepared"
     arguments = ("--participant", "P001", "--simulate", "--fast", "--data", prepared)
-    first = labcrane("run", protocol, *arguments)
-    assert first.wait() == 0, first.communicate()
-    first.communicate()
+    finished(labcrane("run", protocol, *arguments))
     chance = random.Random(20261)
     runs = []
     with a_witness(study, folder / "seen.jsonl"):
@@ -99,8 +98,7 @@ def _whole_journal(protocol: Path, prepared: Path, data: Path) -> int:
     """Return the size of a session's journal when nobody kills it."""
     shutil.copytree(prepared, data)
     launcher = run_second(protocol, data)
-    said, _ = launcher.communicate(timeout=240)
-    assert launcher.returncode == 0, said
+    finished(launcher)
     return _size(data / "P001-SIMULATED" / "ses-02_run.xdf")
 
 
@@ -182,9 +180,7 @@ def test_a_killed_session_is_gone_on_with(killed) -> None:
     data = next(data for data, victim, *_ in runs if victim == "session" and _interrupted(data))
     protocol = data.parent / "study.yaml"
     arguments = ("--participant", "P001", "--session", 2, "--simulate", "--data", data)
-    resumed = labcrane("resume", protocol, *arguments)
-    said, _ = resumed.communicate(timeout=240)
-    assert resumed.returncode == 0, said
+    finished(labcrane("resume", protocol, *arguments))
     session = open_recording(data / "P001-SIMULATED" / "P001-SIMULATED.h5").session(2)
     assert session.events["name"].tolist().count("session.start") == 2
     assert session.events["name"].tolist()[-1] == "session.end"

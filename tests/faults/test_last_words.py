@@ -10,7 +10,7 @@ from faults.test_feedback import runs_feedback
 from rehearsal import SHORT
 
 import labcrane as lab
-from labcrane.errors import DeviceError
+from labcrane import DeviceError
 from labcrane.feedback import handle
 from labcrane.feedback.processes import FeedbackProcesses
 from labcrane.launcher.launcher import Launcher

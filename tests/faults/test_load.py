@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-from faults.sessions import STUDY, labcrane, recorder_process, unique, wait_for
+from faults.sessions import STUDY, finished, labcrane, recorder_process, unique, wait_for
 from streams.emulation import Lab
 
 from labcrane import open_recording
@@ -81,8 +81,7 @@ def test_a_laboratory_is_recorded_whole_and_nothing_of_it_stays_in_memory(
         devices.stdin.write("go\n")
         devices.stdin.flush()
         memory = _memory(recorder, launcher)
-        said, _ = launcher.communicate(timeout=240)
-        assert launcher.returncode == 0, said
+        finished(launcher)
     finally:
         devices.kill()
         devices.communicate()

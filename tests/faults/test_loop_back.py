@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from faults.sessions import STUDY, labcrane, unique
+from faults.sessions import STUDY, finished, labcrane, unique
 from needs import GRAPHICS, needs
 
 from labcrane import open_recording
@@ -36,9 +36,7 @@ def test_a_photodiode_on_another_clock_shows_the_delay_that_was_put_in(tmp_path:
     amplifier = subprocess.Popen([*another_clock, sys.executable, str(sensor), *seen])
     try:
         words = ("--participant", "P001", "--simulate", "--feedback", "--data", tmp_path / "data")
-        run = labcrane("run", protocol, *words)
-        said, _ = run.communicate(timeout=240)
-        assert run.returncode == 0, said
+        said = finished(labcrane("run", protocol, *words))
     finally:
         amplifier.kill()
         amplifier.wait()

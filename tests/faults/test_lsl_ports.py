@@ -1,14 +1,13 @@
 """A laboratory full of streams begins with the default ports of LSL, and what it takes of them."""
 
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from needs import needs
 from own_modules import OWN_MODULES
+from programs import ran
 
 from labcrane.streams.network import LOOPBACK
 from labcrane.streams.search import PORTS
@@ -28,12 +27,10 @@ def begun(folder: Path, times: int) -> list[dict]:
     loopback, _, _ = LOOPBACK.partition("[tuning]")
     config.write_text(loopback.replace("PortRange = 128\n", ""))  # what is left is LSL's default
     assert "PortRange" not in config.read_text()
-    done = subprocess.run(
+    done = ran(
         [*NETWORK, sys.executable, str(HERE / "crowded_run.py"), str(folder), str(times)],
-        capture_output=True,
-        text=True,
         check=True,
-        env={**os.environ, "LSLAPICFG": str(config), "PYTHONPATH": OWN_MODULES},
+        env={"LSLAPICFG": str(config), "PYTHONPATH": OWN_MODULES},
     )
     return [json.loads(line) for line in done.stdout.splitlines()]
 

@@ -10,7 +10,7 @@ import pytest
 from rehearsal import SHORT, a_study
 from windows import an_x_server
 
-from labcrane.errors import DeviceError
+from labcrane import DeviceError
 from labcrane.feedback.processes import FeedbackProcesses
 from labcrane.session.session import Visit
 

@@ -21,7 +21,7 @@ from labcrane.cli.app import main
 from labcrane.feedback import handle as feedback_handle
 from labcrane.launcher import hang_detector
 from labcrane.launcher.launcher import Launcher, Outcome
-from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.recording import SessionRecord
 from labcrane.session.commands import QueueConsole
 from labcrane.session.visit import visit_of
 

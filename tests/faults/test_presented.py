@@ -17,11 +17,11 @@ from needs import GRAPHICS, needs
 from simple_crane import FORM
 from windows import an_x_server
 
-from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis import find_cohort
 from labcrane.analysis.measures import measure_session
 from labcrane.analysis.presented import PresentedLimits, not_presented
 from labcrane.analysis.quality import exclusions, is_result
-from labcrane.core.records import Event
+from labcrane.core import Event
 from labcrane.launcher.launcher import Launcher
 from labcrane.launcher.pages import left_behind
 from labcrane.session.commands import Command, Order, QueueConsole

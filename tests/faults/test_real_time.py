@@ -1,7 +1,6 @@
 """A session in real time: what it asks of the system, what it is granted, and what is recorded."""
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import psutil
 import pytest
 from faults.sessions import STUDY, labcrane, session_process, unique, wait_for
 from needs import needs
+from programs import ran
 
 from labcrane import open_recording
 from labcrane.cli.app import main
@@ -76,12 +76,7 @@ def test_who_may_have_no_real_time_priority_is_told_how_before_anything_is_recor
     protocol.write_text(STUDY.format(study=unique("priority")), encoding="utf-8")
     asked = ["run", str(protocol), "--participant", "P001", "--session", "2", "--simulate"]
     nobody = ["unshare", "-r", "prlimit", "--rtprio=0"]
-    done = subprocess.run(
-        [*nobody, sys.executable, "-m", "labcrane", *asked, "--real-time"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = ran([*nobody, sys.executable, "-m", "labcrane", *asked, "--real-time"])
     assert done.returncode == 1
     assert (
         "--real-time: this user may have no real-time priorities; write '@labcrane - rtprio "

@@ -10,7 +10,7 @@ from faults.sessions import unique
 from needs import needs
 from simple_crane import FORM
 
-from labcrane.core.records import Event
+from labcrane.core import Event
 from labcrane.session.commands import Command, Order
 
 STUDY = (

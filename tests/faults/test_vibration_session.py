@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from faults.sessions import kill_all, labcrane, unique, wait_for
+from faults.sessions import finished, kill_all, labcrane, unique, wait_for
 from needs import needs
 from simple_crane import FORM
 from tactor_board import Board, serial_board
@@ -74,9 +74,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Done:
         killed = time.monotonic()
         wait_for(lambda: not board.vibrates())
         last = board.changes()[-1][0]
-        resumed = labcrane("resume", protocol, *options)
-        said = resumed.communicate(timeout=240)[0]
-        assert resumed.returncode == 0, said
+        finished(labcrane("resume", protocol, *options))
         return Done(data, board, last - killed)
 
 
@@ -135,9 +133,7 @@ def test_the_session_is_exported_and_reported(done: Done, tmp_path: Path) -> Non
         ("export", done.data, "--include", "simulated", "--to", "tables", "--out", tmp_path / "t"),
         ("report", done.data, "--include", "simulated", "--out", tmp_path / "r"),
     ):
-        process = labcrane(*words)
-        said = process.communicate(timeout=240)[0]
-        assert process.returncode == 0, said
+        finished(labcrane(*words))
     (trials,) = (tmp_path / "t").rglob("trials.csv")
     table = pd.read_csv(trials)
     given = set(zip(table["condition"], table["feedback"], strict=True))

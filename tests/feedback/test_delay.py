@@ -16,9 +16,9 @@ from needs import GRAPHICS, needs
 from rehearsal import SHORT, a_study
 from tactor_board import serial_board
 
+from labcrane import DeviceError, ProtocolError, StreamError
 from labcrane.cli.app import main
 from labcrane.cli.commands.delay import measure_delay
-from labcrane.errors import DeviceError, ProtocolError, StreamError
 from labcrane.feedback.delays import delay_in_words, delay_path, read_delays
 from labcrane.feedback.measure_delay import measure
 from labcrane.feedback.processes import FeedbackProcesses

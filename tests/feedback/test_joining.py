@@ -13,9 +13,8 @@ import pylsl
 import pytest
 from faults.sessions import unique, wait_for
 
-from labcrane import Frame, Tick
+from labcrane import Frame, StreamError, Tick
 from labcrane.core import Event
-from labcrane.errors import StreamError
 from labcrane.feedback import process
 from labcrane.feedback.config import ComponentConfig, FeedbackConfig
 from labcrane.feedback.process import FeedbackProcess

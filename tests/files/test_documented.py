@@ -1,9 +1,9 @@
 """What is written in YAML describes itself."""
 
-import subprocess
 import sys
 
 import pytest
+from programs import ran
 from pydantic import Field, ValidationError
 
 from labcrane.files.model import StrictModel
@@ -64,9 +64,7 @@ def test_a_model_whose_source_is_nowhere_has_a_schema_without_words() -> None:
         "    'In metres.'\n"
         "print(Typed.model_json_schema()['properties'])\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, encoding="utf-8", check=True
-    )
+    done = ran([sys.executable, "-c", program], check=True)
     assert done.stdout.strip() == "{'length': {'title': 'Length', 'type': 'number'}}"
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from labcrane import RecordingError
 from labcrane.cli.typed import chunks_by_thread
-from labcrane.core.findings import Verdict
+from labcrane.core import Verdict
 from labcrane.errors import StorageError
 from labcrane.files import atomic, lock, system
 from labcrane.files.append import AppendFile

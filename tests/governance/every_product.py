@@ -21,9 +21,9 @@ from labcrane.analysis.scoring.operator_tests import OperatorTest
 from labcrane.analysis.scoring.settings import IndicatorSettings
 from labcrane.cli.app import main
 from labcrane.cli.commands import simulate
-from labcrane.participants import recovery
+from labcrane.participants import recovery, written_about
 from labcrane.participants.folders import Places
-from labcrane.participants.products import product, written_about
+from labcrane.participants.products import product
 from labcrane.participants.register import read
 
 PEOPLE = ("P001", "P0011", "VP-001")

@@ -8,10 +8,9 @@ import pytest
 from governance.approved_lab import approved_lab, refusal
 from governed import PERSON, TODAY, Lab, edit
 
-from labcrane import ProtocolError
+from labcrane import InputDevice, ProtocolError
 from labcrane.approval.decision import Grant, amend, approve
 from labcrane.approval.lock import lock_path, read_lock
-from labcrane.core.roles import InputDevice
 from labcrane.registry.registry import discover
 from labcrane.session.eligibility import EXEMPT, check_eligibility
 

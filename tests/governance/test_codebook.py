@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from governed import GOVERNED, GROUPED, PERSON, TODAY, Lab
-from rehearsal import ScriptedConsole, a_study
+from rehearsal import ScriptedConsole, a_study, loaded
 
 import labcrane
 from labcrane import ProtocolError
@@ -19,8 +19,6 @@ from labcrane.approval.methods import methods
 from labcrane.cli.app import main
 from labcrane.design.allocation import allocate, as_csv, balance
 from labcrane.design.plan import plan_session
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 from labcrane.session.session import Visit, run
 
 FACTORS = (
@@ -239,7 +237,7 @@ def test_the_balance_of_36_participants_is_checked_and_exported(
     assert "not balanced" not in said
     rows = list(csv.DictReader(export.read_text(encoding="utf-8").splitlines()))
     assert len(rows) == 36
-    study = load(path, discover())
+    study = loaded(path)
     for row in (rows[0], rows[20]):
         plan = plan_session(study, row["participant"], 1)
         assert (row["group"], int(row["seed"]), int(row["slot"])) == (

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from governed import GOVERNED, TODAY, put_stand_in
+from programs import ran
 
 import labcrane
 from labcrane.cli.app import main
@@ -39,13 +40,7 @@ def approve(capsys: pytest.CaptureFixture[str]) -> str:
 
 def run_session(said: str) -> subprocess.CompletedProcess[str]:
     run = ["run", "study.yaml", "--participant", "P001", "--local", "--no-page"]
-    return subprocess.run(
-        [sys.executable, "-m", "labcrane", *run],
-        input=said,
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-    )
+    return ran([sys.executable, "-m", "labcrane", *run], input=said)
 
 
 @pytest.mark.slow

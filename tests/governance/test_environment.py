@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from governed import GOVERNED, TODAY, Lab, edit
 
+from labcrane import ProtocolError
 from labcrane.approval.decision import amend
 from labcrane.approval.environment import _environment, changes, environment, fingerprint_of
 from labcrane.approval.lock import read_lock
-from labcrane.errors import ProtocolError
 from labcrane.registry.entry_points import one_name
 from labcrane.session.eligibility import check_eligibility
 

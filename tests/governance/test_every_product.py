@@ -3,7 +3,6 @@
 Making them takes longer than anything else in this folder, so the tests of them are long ones.
 """
 
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -23,6 +22,7 @@ from governance.every_product import (
 from governance.kept_people import REASON
 from governed import TODAY, Lab
 from needs import GRAPHICS, missing, needs
+from programs import ran
 
 from labcrane.analysis import Exporter
 from labcrane.cli.app import COMPLETING, commands, main
@@ -111,11 +111,14 @@ def test_the_shared_files_that_stay_work(made: Snapshot) -> None:
     lab = made.put_back()
     recovery.erase(lab.places, "P001", REASON, TODAY)
     tables = root_of(lab) / "elsewhere" / "tables"
-    said = subprocess.run(
-        ["Rscript", "-e", f"source('{tables}/read.R'); x <- read_labcrane('{tables}'); "
-         "cat(sort(unique(as.character(x$trials$participant))))"],
-        capture_output=True, encoding="utf-8", check=False,
-    )  # fmt: skip
+    said = ran(
+        [
+            "Rscript",
+            "-e",
+            f"source('{tables}/read.R'); x <- read_labcrane('{tables}'); "
+            "cat(sort(unique(as.character(x$trials$participant))))",
+        ]
+    )
     assert said.returncode == 0, said.stderr
     assert said.stdout.split() == ["P0011", "VP-001"]
 

@@ -2,13 +2,13 @@
 
 import json
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from governed import Lab, edit
 from needs import need
+from programs import ran
 
 from labcrane import ProtocolError
 from labcrane.approval.lock import lock_path
@@ -62,10 +62,10 @@ def test_labcrane_run_refuses_another_number_or_question_in_any_file_and_names_i
     """With the command itself, in another working folder than the one it was approved from."""
     for name, (old, new) in DRIFTS.items():
         edit(rescue.folder / name, old, new)
-    done = subprocess.run(
+    done = ran(
         [sys.executable, "-m", "labcrane", "run", "study.yaml", "--participant", "R001"],
-        cwd=rescue.folder, capture_output=True, encoding="utf-8", check=False,
-    )  # fmt: skip
+        cwd=rescue.folder,
+    )
     assert done.returncode == 2
     for said in (
         "  file scenes/touch.yaml: goals[1].radius was 0.08, is 0.09",

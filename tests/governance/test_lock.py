@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import subprocess
 import sys
 from datetime import timedelta
 from importlib.metadata import entry_points
@@ -12,6 +11,7 @@ import pytest
 from governance.approved_lab import approved_lab, refusal
 from governed import GROUPED, TODAY, Lab, edit
 from needs import needs
+from programs import ran
 
 from labcrane.approval.decision import Grant, approve, verify
 from labcrane.approval.difference import differences
@@ -228,10 +228,7 @@ def test_the_lock_holds_on_another_computer_under_another_path(lab: Lab, tmp_pat
         "registry = discover(study=Path(sys.argv[2]))\n"
         "print(verify(load(Path(sys.argv[2]), registry), registry, date.today()).seal)\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program, str(copies), "study.yaml"],
-        cwd=elsewhere, capture_output=True, encoding="utf-8", check=False,
-    )  # fmt: skip
+    done = ran([sys.executable, "-c", program, str(copies), "study.yaml"], cwd=elsewhere)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == read_lock(lab.protocol).seal
     assert str(tmp_path) not in lock_path(lab.protocol).read_text(encoding="utf-8")

@@ -3,7 +3,6 @@
 import random
 import re
 import stat
-import subprocess
 import unicodedata
 from io import StringIO
 from pathlib import Path
@@ -15,10 +14,12 @@ from governed import TODAY, Lab
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from needs import needs
+from programs import ran
 from rehearsal import SHORT, a_study
 
 from labcrane import ProtocolError, RecordingError
-from labcrane.files.names import DEVICES, LONGEST, OURS, check_name, file_name_of, misfit, twin_key
+from labcrane.core import file_name_of
+from labcrane.files.names import DEVICES, LONGEST, OURS, check_name, misfit, twin_key
 from labcrane.participants import recovery
 from labcrane.participants.copies import inventory
 from labcrane.participants.enrolment import check_apart
@@ -88,7 +89,7 @@ def test_of_names_that_r_reads_as_one_number_one_is_let_in() -> None:
     # Each in a column of its own, so that R takes it for a number where it can.
     alone = ", ".join(f'read.csv(text = "p\\n{name}")$p' for name in people)
     asked = f'cat(sapply(list({alone}), as.character), sep = "\\n")'
-    done = subprocess.run(["Rscript", "-e", asked], capture_output=True, text=True, check=True)
+    done = ran(["Rscript", "-e", asked], check=True)
     values = done.stdout.split()
     assert len(values) == len(people)
     assert len(set(values)) == len(values)

@@ -13,19 +13,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from faults.sessions import STUDY, kill_all, labcrane, wait_for
+from faults.sessions import STUDY, finished, kill_all, labcrane, wait_for
 from governance.test_commands import Terminal
-from rehearsal import ScriptedConsole
+from rehearsal import ScriptedConsole, loaded
 
 from labcrane.cli.app import main
 from labcrane.cli.problem_report import EVENTS, places
-from labcrane.core.findings import Finding, Verdict
-from labcrane.core.records import Event
+from labcrane.core import Event, Finding, Verdict
 from labcrane.doctor.report import Check
-from labcrane.protocol.study import load
 from labcrane.recording.crash_marker import crash_marker_path, read_crash_marker
 from labcrane.recording.journal import Column, SessionJournal
-from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
 from labcrane.session.session import Visit, run
 
@@ -106,7 +103,7 @@ def report(*words: object, status: int = 0) -> Path:
 @pytest.mark.slow
 def test_nothing_of_people_is_in_any_byte_of_the_report_of_a_session(here: Path) -> None:
     protocol = a_protocol(here)
-    visit = Visit(load(protocol, discover()), PERSON, 1, here / "data", simulated=True, fast=True)
+    visit = Visit(loaded(protocol), PERSON, 1, here / "data", simulated=True, fast=True)
     run(visit, ScriptedConsole({50: [Command(Order.NOTE, f"{PERSON} {NOTE}")]}))
     archive = report("--protocol", protocol, "--yes")
     assert planted_in(archive) == []
@@ -134,9 +131,7 @@ def killed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("killed") / FOLDER
     folder.mkdir()
     words = ("run", a_protocol(folder), "--participant", PERSON, "--simulate")
-    first = labcrane(*words, "--fast", cwd=folder)
-    said, _ = first.communicate(timeout=120)
-    assert first.returncode == 0, said
+    finished(labcrane(*words, "--fast", cwd=folder))
     second = labcrane(*words, "--session", 2, cwd=folder)
     journal = folder / "data" / f"{PERSON}-SIMULATED" / "ses-02_run.xdf"
     wait_for(lambda: journal.exists() and b'"trial.start"' in journal.read_bytes())

@@ -14,7 +14,7 @@ from labcrane.participants import recovery as unfinished
 from labcrane.participants.copies import inventory
 from labcrane.participants.deviations import all_deviations
 from labcrane.participants.register import read
-from labcrane.recording.annotations import annotate
+from labcrane.recording import annotate
 from labcrane.recording.journal_reader import read_journal
 from labcrane.recording.xdf.reader import read_xdf
 

@@ -3,11 +3,9 @@
 from pathlib import Path
 
 import pytest
-from rehearsal import SHORT, a_study, rehearse
+from rehearsal import SHORT, a_study, loaded, rehearse
 
 from labcrane import ProtocolError
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 
 ROOT = Path(__file__).parents[2]
 ENOUGH = SHORT.replace(
@@ -73,7 +71,7 @@ def test_a_step_that_makes_no_sense_is_told(tmp_path: Path, old: str, new: str, 
 @pytest.mark.parametrize("variant", ["protocol", "joysticks", "keyboard"])
 def test_nobody_meets_a_scene_of_retrieval_first_where_it_is_measured(variant: str) -> None:
     """As many successes as scenes end no practice before each scene has come once."""
-    study = load(ROOT / "protocols" / "retrieval" / f"{variant}.yaml", discover())
+    study = loaded(ROOT / "protocols" / "retrieval" / f"{variant}.yaml")
     (session,) = study.protocol.sessions
     kinds = [step.kind for step in session.steps]
     (practice,) = [step.block for step in session.steps if step.kind == "practice"]

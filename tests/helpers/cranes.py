@@ -1,7 +1,7 @@
 """Cranes for tests: built as a rig builds them, opened, driven."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -44,12 +44,9 @@ def standing(
     **hanging: object,
 ) -> Iterator[Dynamics]:
     """Yield an open crane at its pose of rest."""
-    crane = build(name, machine, actuator, **hanging)
-    try:
+    with closing(build(name, machine, actuator, **hanging)) as crane:
         crane.open(replace(make_run(machine), rate_hz=rate_hz))
         yield crane
-    finally:
-        crane.close()
 
 
 def drive(crane: Dynamics, commands: FloatArray, rate_hz: float = RATE_HZ) -> FloatArray:

@@ -2,14 +2,14 @@
 
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from labcrane import Dynamics, Signal
 from labcrane.core import PlannedTrial
-from labcrane.machines.library import load_machine
+from labcrane.machines import load_machine
 from labcrane.testing import RATE_HZ, make_run, make_trial
 from labcrane_dmd import labcrane_dynamics
 from labcrane_dmd.arm.settings import ArmSettings, JawsSettings
@@ -44,13 +44,11 @@ def standing(scene: str | None = None, folder: Path | None = None, **settings) -
     arm = build(machine, **settings)
     signal = Signal("valve.signal", "1", machine.names)
     run = make_run(machine, command=(signal,), state=arm.signals)
-    try:
+    with closing(arm):
         arm.open(run)
         if scene is not None:
             arm.begin_trial(make_trial(PlannedTrial({"scenario": "scene"}, expected_s=1.0)))
         yield arm, run.state
-    finally:
-        arm.close()
 
 
 def step(arm: Dynamics, seconds: float, /, **signals: float) -> np.ndarray:

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from simple_crane import CRANE
 
+from labcrane import Frame, ProtocolError, Run
+from labcrane.cli.app import main
+from labcrane.core import Event
 from labcrane.core.clock import Clock, ManualClock
-from labcrane.core.records import Event, Frame, Run
 from labcrane.design.plan import plan_session
-from labcrane.errors import ProtocolError
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import Registry, discover
@@ -37,10 +38,23 @@ sessions:
 )
 
 
+def loaded(path: Path) -> Study:
+    """Return the study of a protocol, with what is installed."""
+    return load(path, discover())
+
+
 def a_study(folder: Path, text: str = SHORT) -> Study:
     path = folder / "study.yaml"
     path.write_text(text, encoding="utf-8")
-    return load(path, discover())
+    return loaded(path)
+
+
+def simulated_file(folder: Path, text: str) -> Path:
+    """Simulate a study's first session by the command; return the participant file."""
+    (folder / "study.yaml").write_text(text, encoding="utf-8")
+    words = ["run", str(folder / "study.yaml"), "--participant", "P001", "--simulate", "--fast"]
+    assert main([*words, "--data", str(folder / "data")]) == 0
+    return folder / "data" / "P001-SIMULATED" / "P001-SIMULATED.h5"
 
 
 def said_of(path: Path, text: str, registry: Registry) -> list[str]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcrane import Controller, FloatArray, Machine
-from labcrane.machines.library import load_machine
+from labcrane.machines import load_machine
 from labcrane.testing import (
     ch8,
     make_run,

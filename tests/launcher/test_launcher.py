@@ -54,25 +54,36 @@ class LateRecorder:
         pass
 
 
+def a_launcher(
+    folder: Path, needs: str = "", **how: bool
+) -> tuple[Launcher, QueueConsole, list[str]]:
+    """Return the launcher of a study with further lines, its console, and what it says."""
+    (folder / "study.yaml").write_text(
+        STUDY.format(study=unique("launched")) + needs, encoding="utf-8"
+    )
+    console, said = QueueConsole(), []
+    visit = visit_of(folder / "study.yaml", "P001", 1, folder / "data", feedback=False, **how)
+    return Launcher(visit, console, said.append), console, said
+
+
+EEG = "streams: {eeg: {type: EEG}}\n"
+
+
 @pytest.mark.slow
 def test_a_note_that_is_given_while_streams_are_waited_for_is_in_the_record(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(launcher_module, "RecorderHandle", LateRecorder)
-    protocol = tmp_path / "study.yaml"
-    protocol.write_text(
-        STUDY.format(study=unique("early")) + "streams: {eeg: {type: EEG}}\n", encoding="utf-8"
-    )
-    console, said = QueueConsole(), []
+    launcher, console, said = a_launcher(tmp_path, EEG, simulated=True)
     for command in (
         Command(Order.NOTE, "the participant is nervous", "supervisor"),
         Command(Order.DENIED, "somebody asked for end", "page"),
         Command(Order.START),
     ):
         console.give(command)
-    order = visit_of(protocol, "P001", 1, tmp_path / "data", simulated=True, feedback=False)
-    assert Launcher(order, console, said.append).run().died is None
-    session = open_recording(order.folder.participant_file).session(1)
+    assert launcher.run().died is None
+    (file,) = tmp_path.rglob("*.h5")
+    session = open_recording(file).session(1)
     events = session.events.set_index("name")["data"]
     assert events["order.note"]["text"] == "the participant is nervous"
     assert events["order.note"]["by"] == "supervisor"
@@ -104,13 +115,7 @@ class AskingRecorder(LateRecorder):
 def test_a_session_begins_when_it_was_said_which_stream_is_meant_and_that_is_in_the_record(
     tmp_path: Path, *, simulated: bool
 ) -> None:
-    protocol = tmp_path / "study.yaml"
-    protocol.write_text(
-        STUDY.format(study=unique("asked")) + "streams: {eeg: {type: EEG}}\n", encoding="utf-8"
-    )
-    console, said = QueueConsole(), []
-    visit = visit_of(protocol, "P001", 1, tmp_path, simulated=simulated, feedback=False)
-    launcher = Launcher(visit, console, said.append)
+    launcher, console, said = a_launcher(tmp_path, EEG, simulated=simulated)
     launcher._recorder = recorder = AskingRecorder()
     if not simulated:  # where nobody can answer, nobody is waited for
         console.give(Command(Order.TAKE, "oxygen", "supervisor"))
@@ -124,12 +129,9 @@ def test_a_session_begins_when_it_was_said_which_stream_is_meant_and_that_is_in_
 
 
 def test_nothing_is_taken_where_no_streams_are_recorded(tmp_path: Path) -> None:
-    protocol = tmp_path / "study.yaml"
-    protocol.write_text(STUDY.format(study=unique("none")), encoding="utf-8")
-    console, said = QueueConsole(), []
-    visit = visit_of(protocol, "P001", 1, tmp_path, simulated=True, feedback=False)
+    launcher, console, said = a_launcher(tmp_path, simulated=True)
     console.give(Command(Order.TAKE, "eeg"))
-    assert Launcher(visit, console, said.append)._orders() == []
+    assert launcher._orders() == []
     assert said == ["take: the study records no external streams"]
 
 
@@ -218,13 +220,8 @@ FILMED = "recordings: {face: {use: camera, device: /dev/no-camera, consent: we f
 def test_a_person_is_not_recorded_until_a_required_camera_is_there(
     tmp_path: Path, *, required: bool
 ) -> None:
-    protocol = tmp_path / "study.yaml"
     filmed = FILMED.replace("consent:", f"required: {str(required).lower()}, consent:")
-    text = STUDY.format(study=unique("filmed")) + filmed
-    protocol.write_text(text, encoding="utf-8")
-    console, said = QueueConsole(), []
-    visit = visit_of(protocol, "P001", 1, tmp_path / "data", pilot=True, feedback=False)
-    launcher = Launcher(visit, console, said.append)
+    launcher, console, said = a_launcher(tmp_path, filmed, pilot=True)
     begun: list[bool] = []
     launcher._run = lambda: begun.append(True)
     thread = threading.Thread(target=launcher.run)

@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from needs import needs
 
+from labcrane import Machine, ProtocolError
 from labcrane.core.cranes.crane_state import CraneState
-from labcrane.errors import ProtocolError
-from labcrane.machines import Arm, link_frames, urdf_of
+from labcrane.machines import Arm, link_frames, reach, urdf_of
 from labcrane.machines.descriptions.description import MachineDescription
-from labcrane.machines.inverse_kinematics import reach
-from labcrane.machines.machine import Machine
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "machines"
 OMX = {

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from labcrane import Machine
-from labcrane.machines import link_frames, reach
-from labcrane.machines.library import load_machine, machine_names
+from labcrane.machines import link_frames, load_machine, reach
+from labcrane.machines.library import machine_names
 
 
 @pytest.fixture(params=machine_names())

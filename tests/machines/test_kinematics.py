@@ -7,9 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from labcrane import FloatArray, Machine
-from labcrane.machines import Arm, jacobian, link_frames, rotation_matrix
+from labcrane.machines import Arm, jacobian, link_frames, load_machine, rotation_matrix
 from labcrane.machines.kinematics import dh_matrix
-from labcrane.machines.library import load_machine
 
 MACHINES = ("ch8", "ch8_cranelike")
 SCALE = 22.3107  # from the OpenManipulator-X to the crane

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from labcrane import ProtocolError
-from labcrane.machines.library import load_machine, machine_names
+from labcrane.machines import load_machine
+from labcrane.machines.library import machine_names
 
 GOOD = """\
 title: Digger

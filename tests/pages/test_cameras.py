@@ -4,6 +4,7 @@ import json
 import math
 import re
 import signal
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,12 @@ from cranes import needs_bullet
 from faults.sessions import unique, wait_for
 from pages.looks import complaints
 from pages.room import STUDY, Room, a_room, photograph, press, shown, text
+from rehearsal import loaded
 from selenium import webdriver
 
 from labcrane import Frame, Tick, open_recording
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import load
-from labcrane.recording.participant_file.reader import SessionRecord
-from labcrane.registry.registry import discover
+from labcrane.recording import SessionRecord
 from labcrane.testing import ch8
 from labcrane_view.settings import ViewSettings
 from labcrane_view.view import View
@@ -148,16 +148,13 @@ def test_the_supervisor_sees_cameras_and_torques(tmp_path: Path, browser: webdri
 
 def drawn_from(session: SessionRecord, protocol: Path, row: int) -> np.ndarray:
     """Return the second camera's picture of a recorded frame."""
-    study = load(protocol, discover())
+    study = loaded(protocol)
     run = Rig.build(study, simulated=True).describe(study, participant_seed=0)
     state = session.streams["state"].data.to_numpy()[row]
     nothing = np.zeros(0)
     frame = Frame(Tick(0, 0.0, 0.0), 0.0, nothing, nothing, state, np.full(run.task.size, math.nan))
-    view = View(ViewSettings(**{**VIEW, "rate_hz": None}), study.machine)
-    try:
+    with closing(View(ViewSettings(**{**VIEW, "rate_hz": None}), study.machine)) as view:
         view.open(run)
         view.present(frame)
         view.present(frame)
         return view.picture()[:, VIEW["size"][0] // 2 :].astype(int)
-    finally:
-        view.close()

@@ -2,6 +2,7 @@
 
 import http.client
 import random
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -20,13 +21,10 @@ HOST = "127.0.0.1"
 
 
 def answer(port: int, path: str, cookie: str = "") -> tuple[int, str, str]:
-    to = http.client.HTTPConnection(HOST, port, timeout=240)
-    try:
+    with closing(http.client.HTTPConnection(HOST, port, timeout=240)) as to:
         to.request("GET", path, headers={"Cookie": cookie} if cookie else {})
         got = to.getresponse()
         return got.status, got.getheader("set-cookie") or "", got.read().decode()
-    finally:
-        to.close()
 
 
 @pytest.mark.slow

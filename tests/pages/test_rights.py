@@ -2,7 +2,6 @@
 
 import http.client
 import socket
-import subprocess
 import sys
 from pathlib import Path
 from urllib.parse import quote
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from faults.sessions import labcrane, unique, wait_for
 from pages.room import STUDY, Room, a_room
+from programs import ran
 
 from labcrane import open_recording
 from labcrane.session.commands import Order
@@ -59,9 +59,7 @@ def let_loose(room: Room, cookie: str) -> int:
     """Let a rude client loose; return how often it got in."""
     program = [sys.executable, str(Path(__file__).with_name("rude.py")), str(room.port)]
     arguments = [socket_request(room, cookie).decode(), cookie, str(RECONNECTS), "0"]
-    done = subprocess.run(
-        [*program, *arguments], input="go\n", capture_output=True, text=True, check=True
-    )
+    done = ran([*program, *arguments], input="go\n", check=True)
     return int(done.stdout)
 
 

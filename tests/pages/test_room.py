@@ -14,14 +14,13 @@ import pytest
 from faults.sessions import wait_for
 from governed import TODAY, Lab
 from pages.room import STUDY
+from rehearsal import loaded
 
 from labcrane.cli.terminal import KEYS as TERMINAL_KEYS
+from labcrane.core import Event
 from labcrane.core.events import KINDS
-from labcrane.core.records import Event
 from labcrane.design.plan import plan_session
 from labcrane.participants.enrolment import exclude
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order, SettingChange, read_request
 from labcrane.session.live_settings import FeedbackSettings
 from labcrane.streams.recorder.candidates import answered
@@ -457,7 +456,7 @@ def test_a_page_that_knows_nothing_of_a_study_s_streams_does_not_say_that_there_
     for more, said in (("", "This study records no external streams."),
                        (asked, "Waiting for the study's streams: eeg.")):  # fmt: skip
         path.write_text(STUDY.format(study="streams", steps=steps) + more, encoding="utf-8")
-        study = load(path, discover())
+        study = loaded(path)
         context = SimpleNamespace(
             study=study, plan=plan_session(study, "P001", 1), session=SessionView()
         )
@@ -496,7 +495,7 @@ def test_the_strip_of_steps_says_what_is_done_what_runs_and_how_long_each_takes(
     steps = indent(steps, 6 * " ")
     (tmp_path / "lift.md").write_text("Lift it.\n")
     path.write_text(STUDY.format(study="strip", steps=steps), encoding="utf-8")
-    study = load(path, discover())
+    study = loaded(path)
     plan = plan_session(study, "P001", 1)
     began, ended = ("step.start", {"step": 1, "kind": "instructions"}), ("step.end", {"step": 1})
     for events, states in (

@@ -10,11 +10,9 @@ from faults.sessions import wait_for
 from pages.room import photograph, text
 from pages.test_states import Told, opened, pages
 from PIL import Image
+from rehearsal import loaded
 from selenium import webdriver
 from selenium.webdriver.common.by import By
-
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 
 pytestmark = pytest.mark.slow
 
@@ -59,7 +57,7 @@ def test_a_scale_is_one_row_or_on_a_phone_one_column_between_its_anchors_for_a_f
     name: str, tmp_path: Path, browser: webdriver.Chrome
 ) -> None:
     with pages(tmp_path, SHORT) as told:
-        items = load(told.order.protocol, discover()).questionnaires[name].items()
+        items = loaded(told.order.protocol).questionnaires[name].items()
         asked(told, browser, name)
         for width in WIDTHS:
             sized(browser, width)
@@ -96,7 +94,7 @@ def test_the_bar_of_answers_is_as_full_as_there_are_answers(
     with pages(tmp_path) as told:
         asked(told, browser, "load")
         sized(browser, 1280)
-        items = load(told.order.protocol, discover()).questionnaires["load"].items()
+        items = loaded(told.order.protocol).questionnaires["load"].items()
         for done, item in enumerate(("", *(each.name for each in items))):
             if item:
                 told.happens(("questionnaire.answer", {"item": item, "value": 50.0}))
@@ -179,7 +177,7 @@ def test_the_titles_of_a_pair_stand_on_the_sides_that_the_record_says(
 ) -> None:
     weighted = "  pairs: {use: nasa_tlx, weighted: true}\n"
     with pages(tmp_path, weighted) as told:
-        items = load(told.order.protocol, discover()).questionnaires["pairs"].items()
+        items = loaded(told.order.protocol).questionnaires["pairs"].items()
         order = " ".join(item.name for item in items)
         opened(browser, told.links["participant"])
         start = {"questionnaire": "pairs", "title": "Load", "kept": "{}", "order": order}

@@ -17,7 +17,7 @@ from selenium import webdriver
 from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.by import By
 
-from labcrane.core.records import Event
+from labcrane.core import Event
 from labcrane.session.commands import Command
 from labcrane.web.control_room.condition import STATES
 from labcrane.web.handle import PageHandle, free_port

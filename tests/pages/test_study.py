@@ -19,8 +19,8 @@ from selenium import webdriver
 from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.by import By
 
+from labcrane import ProtocolError, RecordingError
 from labcrane.cli.app import main
-from labcrane.errors import ProtocolError, RecordingError
 from labcrane.participants.enrolment import exclude, note
 from labcrane.participants.register import Sitting, changed, read
 from labcrane.participants.session_windows import check_visit

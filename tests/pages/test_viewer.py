@@ -16,16 +16,16 @@ from faults.sessions import unique, wait_for
 from pages.looks import check
 from pages.room import shown, text
 from pages.test_reach import ACKNOWLEDGED, AWAY
+from rehearsal import simulated_file
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from simple_crane import FORM
 
-from labcrane import open_recording
+from labcrane import RecordingError, open_recording
 from labcrane.cli.app import main
-from labcrane.core.records import Event
-from labcrane.errors import RecordingError
-from labcrane.machines.kinematics import link_frames
+from labcrane.core import Event
+from labcrane.machines import link_frames
 from labcrane.registry.registry import discover
 from labcrane.web.control_room.shown import ShownShapes
 from labcrane.web.translations import WORDS
@@ -46,12 +46,7 @@ STUDY = (
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("viewed")
-    protocol = folder / "study.yaml"
-    protocol.write_text(STUDY.format(study=unique("viewed")))
-    words = ["run", str(protocol), "--participant", "P001", "--simulate", "--fast"]
-    assert main([*words, "--data", str(folder / "data")]) == 0
-    return folder / "data" / "P001-SIMULATED" / "P001-SIMULATED.h5"
+    return simulated_file(tmp_path_factory.mktemp("viewed"), STUDY.format(study=unique("viewed")))
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import av
 import h5py
 import numpy as np
 import pytest
-from faults.sessions import labcrane, wait_for
+from faults.sessions import finished, labcrane, wait_for
 from faults.test_filmed_session import STUDY, WHO, filming, size
 from pages.looks import check
 from pages.room import shown, text
@@ -57,8 +57,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     wait_for(lambda: size(there / "ses-01_run.xdf") > 300_000)
     wait_for(lambda: size(there / "ses-01_face.mkv") > 0)
     filming(launcher, "face").kill()
-    said = launcher.communicate(timeout=240)[0]
-    assert launcher.returncode == 0, said
+    finished(launcher)
     return there / f"{there.name}.h5"
 
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from labcrane.errors import ProtocolError
+from labcrane import ProtocolError
 from labcrane.files.pseudonyms import pseudonyms
 
 

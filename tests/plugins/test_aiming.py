@@ -8,8 +8,7 @@ import pytest
 
 from labcrane import ProtocolError, Task
 from labcrane.core import Phase
-from labcrane.machines import reach
-from labcrane.machines.library import load_machine
+from labcrane.machines import load_machine, reach
 from labcrane.testing import TaskContract, ch8, crane_at, make_frame, make_run, make_trial, opened
 from labcrane_aiming import labcrane_tasks
 from labcrane_aiming.aiming import Aiming

@@ -15,8 +15,7 @@ from cranes import (
 )
 
 from labcrane import Dynamics
-from labcrane.machines import Arm, jacobian
-from labcrane.machines.library import load_machine
+from labcrane.machines import Arm, jacobian, load_machine
 from labcrane.testing import RATE_HZ, DynamicsContract, ch8, crane_state
 
 

@@ -1,7 +1,6 @@
 """The engines against the velocity law, other geometries, and itself."""
 
 import hashlib
-import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -21,10 +20,10 @@ from cranes import (
     rates,
     standing,
 )
+from programs import ran
 
 from labcrane import FloatArray, Machine
-from labcrane.machines import ACTUATOR_PRESETS, Arm, link_frames
-from labcrane.machines.library import load_machine
+from labcrane.machines import ACTUATOR_PRESETS, Arm, link_frames, load_machine
 from labcrane.testing import RATE_HZ, ch8
 
 
@@ -181,12 +180,7 @@ print("states", digest.hexdigest())
 
 
 def digest_of_another_process(name: str, actuator: str) -> str:
-    finished = subprocess.run(
-        [sys.executable, "-c", PROGRAM, name, actuator],
-        check=True,
-        capture_output=True,
-        encoding="utf-8",
-    )
+    finished = ran([sys.executable, "-c", PROGRAM, name, actuator], check=True)
     (line,) = (line for line in finished.stdout.splitlines() if line.startswith("states"))
     return line.split()[1]
 

@@ -3,6 +3,7 @@
 import re
 import sys
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -24,14 +25,12 @@ def test_the_joints_command_is_found_wherever_it_stands(name: str) -> None:
     )
     crane = build(name, machine)
     crane.open(make_run(machine, command=command))
-    try:
+    with closing(crane):
         wanted = 0.1 * np.array(machine.speeds)
         pushed = np.array([9.0, 9.0, *wanted, 9.0])
         for _ in range(60):
             state = crane.step(pushed, 1 / RATE_HZ)
         np.testing.assert_allclose(state[4:8], wanted, rtol=1e-6)
-    finally:
-        crane.close()
 
 
 @cranes

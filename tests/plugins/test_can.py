@@ -2,6 +2,7 @@
 
 import re
 import time
+from contextlib import closing
 from pathlib import Path
 
 import can
@@ -9,8 +10,7 @@ import pytest
 from slcan_adapter import SlcanAdapter
 
 from labcrane import InputDevice, Tick
-from labcrane.testing import InputContract, ch8, make_frame, make_run
-from labcrane.testing.commands import CommandContract
+from labcrane.testing import CommandContract, InputContract, ch8, make_frame, make_run
 from labcrane_can import labcrane_commands
 from labcrane_can.avc import ESTIMATED, FULL, FrameError, State, decode, encode, encode_flow
 from labcrane_can.command_state import PanelCommands
@@ -108,7 +108,7 @@ def test_malformed_commands_are_refused_and_told_when_the_panel_is_missed(
         device = CanPanel(settings, ch8())
         run = make_run(ch8(), axes=device.signals)
         device.open(run)
-        try:
+        with closing(device):
             bus.send(message(0x0CFE3125, data))
             bus.send(message(0x18F00425, bytes(8)))
             wait_for(lambda: device._commands.refused and device._commands.foreign)
@@ -120,8 +120,6 @@ def test_malformed_commands_are_refused_and_told_when_the_panel_is_missed(
                 f"because {why}; 1 frame was not for these valves, the last "
                 "extended 0x18F00425"
             )
-        finally:
-            device.close()
 
 
 def wait_for(ready, seconds: float = 240.0) -> None:
@@ -174,7 +172,7 @@ def test_a_single_open_valve_that_falls_silent_holds_the_machine_and_is_named() 
         return device.read(Tick(1, now, now), make_frame(run))[:4].tolist(), device.fault
 
     device.open(run)
-    try:
+    with closing(device):
         levels = {"slew": 0, "shoulder": 125, "elbow": -50}
         assert read(100.0, levels) == ([0.0, 0.5, -0.2, 0.0], None)
         # Nothing came since; the wrist has never been heard, and may be silent.
@@ -188,8 +186,6 @@ def test_a_single_open_valve_that_falls_silent_holds_the_machine_and_is_named() 
         assert again == ([0.1, 0.0, 0.0, 0.0], None)
         # Others are shut: their silence does no harm.
         assert read(100.7, {"slew": 25}) == ([0.1, 0.0, 0.0, 0.0], None)
-    finally:
-        device.close()
 
 
 def test_another_node_or_priority_is_foreign_when_the_protocol_names_them() -> None:
@@ -208,7 +204,7 @@ def test_a_flooded_bus_holds_the_machine_and_says_so(monkeypatch: pytest.MonkeyP
     run = make_run(ch8(), axes=device.signals)
     with can.Bus(interface="virtual", channel="flood") as bus:
         device.open(run)
-        try:
+        with closing(device):
             end = time.perf_counter() + 240.0
             while time.perf_counter() < end and "flooded" not in (device.fault or ""):
                 for _ in range(100):  # however seldom this process has its turn
@@ -219,5 +215,3 @@ def test_a_flooded_bus_holds_the_machine_and_says_so(monkeypatch: pytest.MonkeyP
             assert "virtual:flood is flooded:" in (device.fault or "")
             assert "where 300 are the most" in (device.fault or "")
             assert not axes.any()
-        finally:
-            device.close()

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import can
 import pytest
+from rehearsal import loaded
 from wrong_protocols import PROTOCOLS
 
 from labcrane import ProtocolError
 from labcrane.__main__ import main
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 from labcrane.testing import ch8
 from labcrane_can.command_state import PanelCommands
 from labcrane_can.settings import ValveMap
@@ -102,7 +101,7 @@ def test_a_check_looks_into_the_dbc_file(panel: Path, valves: str, wrong: str, s
     line = text[: text.index("input:")].count("\n") + 1
     column = text.splitlines()[line - 1].index(wrong) + 1
     with pytest.raises(ProtocolError) as told:
-        load(path, discover())
+        loaded(path)
     found = [each for each in str(told.value).splitlines() if f"{line}:{column}: {said}" in each]
     assert len(found) == 1, str(told.value)
 
@@ -343,8 +342,8 @@ def test_a_study_checks_the_signals_of_a_standard_joystick(panel: Path) -> None:
     rest = "{arm: panel.connected, boom: float.base, jaws: panel.connected}"
     path.write_text(text.replace("map: MAP", f"map: {rest}"), encoding="utf-8")
     with pytest.raises(ProtocolError) as told:
-        load(path, discover())
+        loaded(path)
     assert "BJM1" not in str(told.value)
     path.write_text(path.read_text("utf-8").replace("BJM1.XLeft", "BJM1.XLft"), encoding="utf-8")
     with pytest.raises(ProtocolError, match=r"BJM1\.XLft.*did you mean 'BJM1.XLeft'"):
-        load(path, discover())
+        loaded(path)

@@ -10,14 +10,12 @@ import numpy as np
 import pytest
 from cranes import needs_bullet
 from dmd_arms import with_files
-from rehearsal import NoLog, ScriptedConsole
+from rehearsal import NoLog, ScriptedConsole, loaded
 
+from labcrane import Frame
 from labcrane.core.clock import SystemClock
-from labcrane.core.records import Frame
 from labcrane.design.plan import plan_session
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 from labcrane.session import loop
 from labcrane.session.commands import Command, Order
 from labcrane.session.sequencer import Sequencer
@@ -125,7 +123,7 @@ def session(folder: Path, controls: str, panel: Panel) -> list:
     """Run a session in real time; return when ticks woke, commands, pauses and events."""
     text = PROTOCOL.format(input=controls)
     (with_files(folder) / "study.yaml").write_text(text, encoding="utf-8")
-    study = load(folder / "study.yaml", discover())
+    study = loaded(folder / "study.yaml")
     plan = plan_session(study, "P001", 1)
     rig = Rig.build(study, simulated=False)
     frames = []

@@ -5,7 +5,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 
 import can
 import pytest
@@ -100,7 +100,7 @@ def test_a_panel_behind_socketcand_is_read_told_lost_and_found_again(server: Ser
             time.sleep(0.005)
         raise AssertionError(f"waited in vain; {device.fault}")
 
-    try:
+    with closing(device):
         assert read_until(lambda axes: all(axes[at] for at in (0, 1, 3))) == [0.2, -0.5, 0.0, 1.0]
         assert device.fault is None
         identifier, data = encode(3, -1, 0x80)
@@ -115,8 +115,6 @@ def test_a_panel_behind_socketcand_is_read_told_lost_and_found_again(server: Ser
         read_until(lambda _: device.fault in {why, None})
         read_until(lambda axes: axes == [0.2, -0.5, 0.0, 1.0])  # it was dialled again
         assert device.fault is None
-    finally:
-        device.close()
 
 
 def test_a_server_that_is_not_there_is_told_before_python_can_tries_for_long(

@@ -13,15 +13,14 @@ from shutil import copytree
 import numpy as np
 import pytest
 from cranes import needs_mujoco
+from rehearsal import loaded
 from scheme_setups import LOW, MACHINES, STICKS, end_effector, joint_velocity, push, ready
 
-from labcrane.core.signals import Signal
+from labcrane import Signal
 from labcrane.doctor.checks import directions
-from labcrane.machines.kinematics import jacobian
+from labcrane.machines import jacobian
 from labcrane.protocol.questions import questions
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 from labcrane.testing import make_run
 from labcrane_dmd.arm.settings import ValveSettings
 from labcrane_dmd.arm.valve import Valve
@@ -93,7 +92,7 @@ def test_keys_of_a_keyboard_have_the_directions_of_two_sticks() -> None:
 
 def moved(study_path: Path, **axes: float) -> tuple[np.ndarray, np.ndarray]:
     """Return where the tip is before and after a push of half a second, in m."""
-    study = load(study_path, discover())
+    study = loaded(study_path)
     rig = Rig.build(study, simulated=False)
     run = rig.describe(study, 1)
     rig.dynamics.open(run)
@@ -237,7 +236,7 @@ def a_study(folder: Path, scheme: str, more: str = "") -> Path:
 
 def asked_of(path: Path) -> dict[str, str]:
     """Return what a check asks of the scheme's map."""
-    found = questions(load(path, discover()))
+    found = questions(loaded(path))
     return {each.key: each.text for each in found if ".map." in each.key}
 
 
@@ -269,7 +268,7 @@ def test_a_push_that_would_lift_the_tip_is_asked_about(tmp_path: Path) -> None:
 
 
 def test_a_gripper_and_axes_of_no_stick_have_no_usual_direction() -> None:
-    study = load(ROOT / "protocols" / "retrieval" / "joysticks.yaml", discover())
+    study = loaded(ROOT / "protocols" / "retrieval" / "joysticks.yaml")
     settings = study.scheme.settings
     assert "map.jaws" not in settings.doubts(study.machine)
     assert not any("jaws moves" in said for said in settings.directions(study.machine))
@@ -281,7 +280,7 @@ def test_a_gripper_and_axes_of_no_stick_have_no_usual_direction() -> None:
 
 
 def test_the_doctor_says_which_way_the_machine_of_a_study_goes() -> None:
-    study = load(ROOT / "protocols" / "aiming" / "protocol.yaml", discover())
+    study = loaded(ROOT / "protocols" / "aiming" / "protocol.yaml")
     said = [finding.text for finding in directions(study)]
     assert said == [
         "left stick to the right: the slew turns to the right",

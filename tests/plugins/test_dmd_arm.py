@@ -9,17 +9,16 @@ from dmd_arms import MAP, MODEL, RETRIEVAL, build, standing, step
 
 import labcrane_dmd
 from labcrane import Controller, Dynamics, ProtocolError, Signal
-from labcrane.machines import Arm
-from labcrane.machines.library import load_machine
+from labcrane.machines import Arm, load_machine
 from labcrane.testing import (
     RATE_HZ,
+    CommandContract,
     ControllerContract,
     DynamicsContract,
     ch8,
     crane_at,
     make_run,
 )
-from labcrane.testing.commands import CommandContract
 from labcrane_dmd import labcrane_commands
 from labcrane_dmd.arm.overload import Overload
 from labcrane_dmd.arm.settings import ArmSettings, OverloadSettings, ValveSettings

@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 from cranes import needs_bullet
 from dmd_arms import with_files
-from rehearsal import Rehearsal, rehearse
+from rehearsal import Rehearsal, loaded, rehearse
 
 from labcrane import FloatArray, Frame, InputDevice, Run, Signal, Tick
 from labcrane.core import Phase
-from labcrane.machines import reach
-from labcrane.machines.library import load_machine
+from labcrane.machines import load_machine, reach
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
 
 pytestmark = needs_bullet
@@ -138,7 +135,7 @@ def run_of(
         SCENE.format(things=things, start=start_at(height)), encoding="utf-8"
     )
     (with_files(folder) / "study.yaml").write_text(STUDY, encoding="utf-8")
-    study = load(folder / "study.yaml", discover())
+    study = loaded(folder / "study.yaml")
     return rehearse(study, orders, rig=replace(Rig.build(study, simulated=True), input=hand))
 
 
@@ -180,16 +177,6 @@ def test_each_push_above_the_limit_is_one_mistake_however_it_trembles(tmp_path: 
         assert (event.data["thing"], event.data["limit"]) == ("block", LIMIT_N)
         assert LIMIT_N < event.data["force"] < 2 * LIMIT_N  # the tick in which it came to be above
     assert (row["outcome"], row["k"]) == ("success", 1.0)
-
-
-@pytest.mark.slow
-def test_the_fifth_push_ends_the_run_with_k_0(tmp_path: Path) -> None:
-    seen = run_of(tmp_path, Pusher(7), BLOCK)
-    (row,) = seen.trials()
-    assert (row["outcome"], row["n_object"], row["k"]) == ("failure", 5.0, 0.0)
-    (end,) = seen.events("mistakes.too_many")
-    assert end.data["kind"] == "object"
-    assert end.time == seen.events("contact.object")[-1].time
 
 
 @pytest.mark.slow

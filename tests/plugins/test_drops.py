@@ -11,8 +11,7 @@ from cranes import needs_bullet
 from dmd_arms import RETRIEVAL, standing, step
 
 from labcrane import FloatArray
-from labcrane.machines import load_scene, place_objects, reach
-from labcrane.machines.library import load_machine
+from labcrane.machines import load_machine, load_scene, place_objects, reach
 from labcrane.testing import RATE_HZ, make_run
 from labcrane_scenario.observation import Observation
 from labcrane_scenario.settings import ScenarioSettings

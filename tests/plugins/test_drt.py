@@ -7,8 +7,7 @@ import pytest
 from pydantic import ValidationError
 from scipy.stats import kstest
 
-from labcrane import Cue, SecondaryTask
-from labcrane.core.clock import Tick
+from labcrane import Cue, SecondaryTask, Tick
 from labcrane.testing import (
     CueContract,
     SecondaryTaskContract,

@@ -7,7 +7,7 @@ import pytest
 from cranes import MACHINES, drive, needs_bullet, needs_mujoco, standing
 
 from labcrane import FloatArray, Machine
-from labcrane.machines.library import load_machine
+from labcrane.machines import load_machine
 from labcrane.testing import RATE_HZ
 
 pytestmark = [needs_bullet, needs_mujoco]

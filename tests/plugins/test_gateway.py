@@ -4,6 +4,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +13,12 @@ import pytest
 from cranes import needs_bullet
 from dmd_arms import with_files
 from gone_stream import goes_once
-from rehearsal import NoLog, ScriptedConsole
+from rehearsal import NoLog, ScriptedConsole, loaded
 
 from labcrane import FloatArray, InputDevice, Run, Tick
 from labcrane.core.clock import SystemClock
 from labcrane.design.plan import plan_session
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 from labcrane.session import loop
 from labcrane.session.commands import Command, Order
 from labcrane.session.sequencer import Sequencer
@@ -57,7 +56,7 @@ sessions: [{name: only, steps: [{block: {task: reach}}]}]
 @needs_bullet
 def test_a_program_written_from_the_documentation_drives_the_arm(tmp_path: Path) -> None:
     (with_files(tmp_path) / "study.yaml").write_text(STUDY, encoding="utf-8")
-    study = load(tmp_path / "study.yaml", discover())
+    study = loaded(tmp_path / "study.yaml")
     plan = plan_session(study, "P001", 1)
     rig = Rig.build(study, simulated=False)
     console, seen = DrivenByAProgram(), []
@@ -151,12 +150,10 @@ def test_what_is_wrong_with_a_station_is_told(labels, sample, complaint: str) ->
     device = Station(GatewaySettings(stream=name), ch8())
     run = make_run(ch8(), axes=device.signals)
     device.open(run)
-    try:
+    with closing(device):
         axes = heard(device, run, outlet, sample, lambda: complaint in (device.fault or ""))
         assert complaint in (device.fault or "")
         assert not axes.any()
-    finally:
-        device.close()
 
 
 def test_a_station_that_goes_while_it_is_found_is_found_again(monkeypatch) -> None:
@@ -165,8 +162,6 @@ def test_a_station_that_goes_while_it_is_found_is_found_again(monkeypatch) -> No
     device = Station(GatewaySettings(stream="gone.once"), ch8())
     run = make_run(ch8(), axes=device.signals)
     device.open(run)
-    try:
+    with closing(device):
         axes = heard(device, run, outlet, [0.0, 125.0, 0.0, 0.0], lambda: device.fault is None)
         assert axes.tolist() == [0.0, 0.5, 0.0, 0.0, 1.0]
-    finally:
-        device.close()

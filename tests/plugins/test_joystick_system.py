@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from programs import ran
 from virtual_sticks import open_fails
 
 from labcrane_joystick import sdl
@@ -129,13 +130,7 @@ def test_the_process_can_still_be_terminated():
 
 
 def test_the_program_without_sticks_ends_with_the_error_and_no_traceback():
-    done = subprocess.run(
-        [sys.executable, "-m", "labcrane_joystick", "--stick", "ffff:fffe"],
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-        timeout=240,
-    )
+    done = ran([sys.executable, "-m", "labcrane_joystick", "--stick", "ffff:fffe"], timeout=240)
     assert done.returncode == 1
     assert done.stderr.startswith("two joysticks ffff:fffe are needed, but none of that model")
     assert len(done.stderr.splitlines()) == 1

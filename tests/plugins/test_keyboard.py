@@ -4,8 +4,8 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +17,7 @@ from needs import needs
 from pydantic import ValidationError
 from windows import an_x_server
 
-from labcrane import InputDevice, ProtocolError
-from labcrane.core.clock import Tick
+from labcrane import InputDevice, ProtocolError, Tick
 from labcrane.testing import RATE_HZ, InputContract, ch8, make_frame, make_run
 from labcrane_keyboard.keyboard import Keyboard
 from labcrane_keyboard.settings import KeyboardSettings
@@ -64,26 +63,30 @@ class Desk:
         return row
 
 
+def keys_outlet(keys: Iterable[str]) -> tuple[str, pylsl.StreamOutlet]:
+    """Stand in for a view that sends its keys' states; return its name too."""
+    view = f"view{time.monotonic_ns()}"
+    labels = ["frame.tick", *(f"key.{key}" for key in keys)]
+    info = pylsl.StreamInfo(
+        f"labcrane.feedback.{view}.keys", "Feedback", len(labels), 0, "double64", view
+    )
+    channels = info.desc().append_child("channels")
+    for label in labels:
+        channels.append_child("channel").append_child_value("label", label)
+    return view, pylsl.StreamOutlet(info)
+
+
 @contextmanager
 def a_view_that_sends(
     keys: tuple[str, ...], **settings: object
 ) -> Iterator[tuple[Desk, pylsl.StreamOutlet]]:
     """Stand in for a view, whose samples are given by hand."""
-    view = f"view{time.monotonic_ns()}"
-    info = pylsl.StreamInfo(
-        f"labcrane.feedback.{view}.keys", "Feedback", len(keys) + 1, 0, "double64", view
-    )
-    channels = info.desc().append_child("channels")
-    for label in ("frame.tick", *(f"key.{key}" for key in keys)):
-        channels.append_child("channel").append_child_value("label", label)
-    outlet = pylsl.StreamOutlet(info)
+    view, outlet = keys_outlet(keys)
     desk = Desk(view, **settings)
-    try:
+    with closing(desk.keyboard):
         keys = desk.keyboard._keys
         wait_for(lambda: keys.connected or keys.complaint)
         yield desk, outlet
-    finally:
-        desk.keyboard.close()
 
 
 def press(desk: Desk, outlet: pylsl.StreamOutlet, *states: float) -> None:
@@ -206,7 +209,7 @@ def test_real_keys_in_a_real_window_move_the_axes() -> None:
     with an_x_server() as display, a_window(view, display) as window:
         focus("--name", "^labcrane$")
         desk = Desk(view, ramp_s=0.0, fall_s=0.0)
-        try:
+        with closing(desk.keyboard):
             desk.read_until(lambda row: row[2] == 1)
             tell("keydown", "d", "keydown", "Down")
             desk.read_until(lambda row: row.tolist() == [1.0, -1.0, 1.0])
@@ -227,5 +230,3 @@ def test_real_keys_in_a_real_window_move_the_axes() -> None:
                 focus("--name", "^labcrane$")
                 tell("keydown", "a")
                 desk.read_until(lambda row: row.tolist() == [-1.0, 0.0, 1.0])
-        finally:
-            desk.keyboard.close()

@@ -11,8 +11,7 @@ from rehearsal import SHORT, a_study, rehearse
 
 from labcrane import InputDevice, Trial
 from labcrane.core import Phase, PlannedTrial
-from labcrane.machines import ACTUATOR_PRESETS
-from labcrane.machines.library import load_machine
+from labcrane.machines import ACTUATOR_PRESETS, load_machine
 from labcrane.protocol.questions import questions
 from labcrane.testing import RATE_HZ, InputContract, ch8
 from labcrane_operator import labcrane_inputs, law
@@ -157,19 +156,6 @@ def test_targets_are_reached_from_rest_and_from_each_other(scheme: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_whole_session_goes_on_from_where_the_machine_stands() -> None:
-    loop = Loop()
-    pairs = [(distance, mirror) for distance in DISTANCES for mirror in (-1, 1)]
-    number, reached = 0, []
-    for distance, mirror in np.random.default_rng(4).permutation(pairs):
-        for target in ends(distance, int(mirror)) * 2:
-            number += 1
-            reached.append(loop.trial(target, number, number).reached_s is not None)
-    assert len(reached) == 32
-    assert np.mean(reached) >= 0.95
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("actuator", ACTUATOR_PRESETS)
 def test_a_machine_that_follows_late_is_brought_in(actuator: str) -> None:
     reached = []
@@ -195,16 +181,6 @@ def test_without_noise_movement_time_follows_fitts_law_exactly_as_set() -> None:
     slope, intercept = np.polyfit(bits, [mean[0] for mean in found.values()], 1)
     assert slope == pytest.approx(b, rel=0.1)
     assert intercept == pytest.approx(a + reaction + 0.2, abs=1.0)
-
-
-@pytest.mark.slow
-def test_movement_time_grows_with_the_index_of_difficulty_with_all_the_noise() -> None:
-    found = times("joint_velocity", range(5), **PRACTISED)
-    bits = [math.log2(distance / 0.5 + 1) for distance in found]
-    means = [np.mean(values) for values in found.values()]
-    slope, _ = np.polyfit(bits, means, 1)
-    assert 0.8 * 2.5 < slope < 1.8 * 2.5, "corrections come on top"
-    assert (np.diff(means) > 0).all()
 
 
 def test_a_machine_that_is_too_slow_makes_the_movement_longer_and_is_still_brought_in() -> None:

@@ -11,10 +11,8 @@ from cranes import needs_bullet
 from dmd_arms import RETRIEVAL, standing
 
 from labcrane.core import Event
-from labcrane.machines import place_objects, segments
+from labcrane.machines import load_machine, load_scene, place_objects, segments
 from labcrane.machines.human_figure import REGIONS
-from labcrane.machines.library import load_machine
-from labcrane.machines.scene import load_scene
 from labcrane.testing import RATE_HZ, make_run
 from labcrane_scenario.observation import Observation
 from labcrane_scenario.settings import ScenarioSettings

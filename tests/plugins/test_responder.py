@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from labcrane import Signal
-from labcrane.core.clock import Tick
+from labcrane import Signal, Tick
 from labcrane.testing import ch8, make_frame, make_run
 from labcrane_operator.responder import Responder
 from labcrane_operator.settings import ResponseSettings

@@ -1,21 +1,21 @@
 """The retrieval study by its real command: all six scenarios, their record and their score."""
 
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from cranes import needs_bullet
+from programs import ran
 
 import labcrane
-from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis import find_cohort
 from labcrane.analysis.scoring.operator_tests import operator_tests
 from labcrane.analysis.scoring.settings import IndicatorSettings
-from labcrane.core.records import Event
-from labcrane.machines.library import load_machine
-from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.core import Event
+from labcrane.machines import load_machine
+from labcrane.recording import SessionRecord
 from labcrane.web.assessment import Assessment
 
 pytestmark = [needs_bullet, pytest.mark.long]
@@ -29,12 +29,7 @@ JOINTS = load_machine("ied_arm.yaml", RETRIEVAL).names
 
 
 def labcrane_command(*words: str) -> str:
-    done = subprocess.run(
-        [sys.executable, "-m", "labcrane", *words],
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-    )
+    done = ran([sys.executable, "-m", "labcrane", *words])
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

@@ -8,18 +8,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 import can
-import pylsl
 import pytest
 from cranes import needs_bullet
 from faults.sessions import wait_for
+from plugins.test_keyboard import keys_outlet
+from rehearsal import loaded
 from ruamel.yaml import YAML
 from virtual_sticks import desk
 
+from labcrane import Tick
 from labcrane.cli.app import main
-from labcrane.core.clock import Tick
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import discover
+from labcrane.protocol.study import Study
 from labcrane.testing import make_frame
 from labcrane_can.avc import encode
 
@@ -97,17 +97,9 @@ def joysticks(study: Study) -> Iterator[Controls]:
 
 @contextmanager
 def keyboard(study: Study) -> Iterator[Controls]:
-    """Stand in for the view, which sends its keys' states."""
     keys = written("keyboard.yaml")["views"]["operator"]["keys"]
     axes = written("keyboard.yaml")["input"]["axes"]
-    view = f"view{time.monotonic_ns()}"
-    info = pylsl.StreamInfo(
-        f"labcrane.feedback.{view}.keys", "Feedback", len(keys) + 1, 0, "double64", view
-    )
-    channels = info.desc().append_child("channels")
-    for label in ("frame.tick", *(f"key.{key}" for key in keys)):
-        channels.append_child("channel").append_child_value("label", label)
-    outlet = pylsl.StreamOutlet(info)
+    view, outlet = keys_outlet(keys)
     settings = study.input.settings.model_copy(update={"view": view})
     object.__setattr__(study.input, "settings", settings)
 
@@ -130,7 +122,7 @@ EACH = pytest.mark.parametrize(
 @EACH
 def test_each_control_moves_each_joint_both_ways_and_stops_it(controls) -> None:
     name = "protocol" if controls is panel else controls.__name__
-    study = load(RETRIEVAL / f"{name}.yaml", discover())
+    study = loaded(RETRIEVAL / f"{name}.yaml")
     with controls(study) as (changed, push, wait_s):
         rig = Rig.build(changed, simulated=False)
         with rig.opened(changed, 1) as run:

@@ -10,9 +10,7 @@ from scipy.spatial import ConvexHull
 
 from labcrane import InputDevice, ProtocolError, Run, Signal, Task
 from labcrane.core import Event, Phase, PlannedTrial
-from labcrane.machines import load_scene, place_objects
-from labcrane.machines.meshes.reader import read_surface
-from labcrane.machines.scene_part import load_part
+from labcrane.machines import load_part, load_scene, place_objects, read_surface
 from labcrane.testing import (
     InputContract,
     TaskContract,

@@ -10,7 +10,7 @@ from dmd_arms import with_files
 from labcrane.cli.app import main
 from labcrane.design.plan import plan_session
 from labcrane.files.pseudonyms import pseudonyms
-from labcrane.machines.scene import load_scene, place_objects
+from labcrane.machines import load_scene, place_objects
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 

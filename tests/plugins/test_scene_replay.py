@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 from cranes import needs_bullet
+from rehearsal import loaded
 
 from labcrane import open_recording
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 from labcrane.replay import replay_session
 from labcrane.session.commands import QueueConsole
 from labcrane.session.session import Visit, run
@@ -31,7 +30,7 @@ def recorded(tmp_path: Path) -> Path:
             text = text.replace(line + "\n", "")
     (study / "protocol.yaml").write_text(text, encoding="utf-8")
     visit = Visit(
-        load(study / "protocol.yaml", discover()),
+        loaded(study / "protocol.yaml"),
         "R001",
         1,
         tmp_path / "data",

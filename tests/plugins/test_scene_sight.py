@@ -1,6 +1,7 @@
 """Sight of the scenarios: what is to be handled is seen by the operator's first camera."""
 
 import math
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -9,8 +10,7 @@ from dmd_arms import RETRIEVAL, build
 from ruamel.yaml import YAML
 
 from labcrane.core import PlannedTrial
-from labcrane.machines import load_scene
-from labcrane.machines.library import load_machine
+from labcrane.machines import load_machine, load_scene
 from labcrane.testing import make_run, make_trial
 
 pytestmark = needs_bullet
@@ -70,7 +70,7 @@ def test_what_is_to_be_handled_is_seen_by_the_operators_first_camera(path) -> No
     arm = build(machine, scenes=(path,))
     arm.open(make_run(machine, state=arm.signals))
     start = load_scene(path).start_deg or (0.0,) * 4
-    try:
+    with closing(arm):
         for seed in range(3):
             arm.reset(np.radians(start).tolist())
             arm.begin_trial(make_trial(PlannedTrial({"scenario": path.stem}, 1.0), seed=seed))
@@ -83,5 +83,3 @@ def test_what_is_to_be_handled_is_seen_by_the_operators_first_camera(path) -> No
                 links = range(-1, pybullet.getNumJoints(standing.body, physicsClientId=client))
                 share = seen(pybullet, client, standing.body, links)
                 assert share > SEEN, thing.name
-    finally:
-        arm.close()

@@ -1,16 +1,15 @@
 """The tone: its laws against closed forms, and the sound itself against a spectrum."""
 
 import math
-import os
-import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from needs import needs
+from programs import ran
 from pydantic import ValidationError
 
 from labcrane import Feedback, Frame
@@ -37,11 +36,8 @@ class TestSonification(FeedbackContract):
 @contextmanager
 def a_synth(**settings: object) -> Iterator[Synth]:
     made = SonificationSettings(**settings)
-    synth = Synth(offline_server(made), made)
-    try:
+    with closing(Synth(offline_server(made), made)) as synth:
         yield synth
-    finally:
-        synth.close()
 
 
 def blocks(synth: Synth, seconds: float) -> np.ndarray:
@@ -188,7 +184,7 @@ def test_impossible_settings_are_refused() -> None:
 
 def test_a_python_without_tkinter_says_nothing_of_it() -> None:
     code = "import sys; sys.modules['tkinter'] = None; import labcrane_sonification.synth"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = ran([sys.executable, "-c", code], check=True)
     assert done.stdout == ""
 
 
@@ -205,12 +201,9 @@ except DeviceError as error:
 
 def refusal(driver: str = "portaudio", device: int | None = None, **env: str) -> str:
     """Return what is said when a sound server is asked for in a process of its own."""
-    done = subprocess.run(
+    done = ran(
         [sys.executable, "-c", NO_DEVICE.format(driver=driver, device=device)],
-        env={**os.environ, "JACK_DEFAULT_SERVER": "nobody", **env},
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
+        env={"JACK_DEFAULT_SERVER": "nobody", **env},
     )
     assert done.returncode == 0, done.stderr  # pyo itself would end with a segmentation fault
     return done.stdout

@@ -2,7 +2,6 @@
 
 import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 from jack_server import a_jack_server, underruns
 from needs import needs
+from programs import ran
 
 from labcrane_sonification import real_time
 from labcrane_sonification.underruns import WINDOW, Underruns
@@ -62,12 +62,8 @@ def played(folder: Path, seconds: float, *how: str, real_time: bool) -> dict[str
     """Play a tone on a server of its own; return what came of it."""
     program = Path(__file__).with_name("play_tone.py")
     with a_jack_server(folder, real_time=real_time) as (name, log):
-        done = subprocess.run(
-            [sys.executable, str(program), str(seconds), *how],
-            env={**os.environ, "JACK_DEFAULT_SERVER": name},
-            capture_output=True,
-            encoding="utf-8",
-            check=False,
+        done = ran(
+            [sys.executable, str(program), str(seconds), *how], env={"JACK_DEFAULT_SERVER": name}
         )
     assert done.returncode == 0, done.stderr
     return {**json.loads(done.stdout.splitlines()[-1]), "underruns": len(underruns(log))}
@@ -120,13 +116,7 @@ for finding in examine(SonificationSettings(driver="jack", block=1024), None):
 @pytest.mark.parametrize("how", ["ordinary", pytest.param("real time", marks=needs_real_time)])
 def test_the_doctor_says_whether_jack_runs_in_real_time(tmp_path: Path, how: str) -> None:
     with a_jack_server(tmp_path, real_time=how == "real time") as (name, _):
-        done = subprocess.run(
-            [sys.executable, "-c", LOOK],
-            env={**os.environ, "JACK_DEFAULT_SERVER": name},
-            capture_output=True,
-            encoding="utf-8",
-            check=False,
-        )
+        done = ran([sys.executable, "-c", LOOK], env={"JACK_DEFAULT_SERVER": name})
     assert done.returncode == 0, done.stderr
     block, scheduling = done.stdout.splitlines()[-2:]
     assert block == "WARN the JACK server takes 48000 Hz in blocks of 1024 samples: 21.3 ms each"

@@ -17,9 +17,8 @@ from needs import needs
 from rehearsal import SHORT, ScriptedConsole, a_study
 
 import labcrane
-from labcrane import DeviceError, PluginError, ProtocolError, Trigger
+from labcrane import DeviceError, PluginError, ProtocolError, Tick, Trigger
 from labcrane.core import Echo, Event
-from labcrane.core.clock import Tick
 from labcrane.core.events import CODES, PULSES
 from labcrane.protocol.questions import questions
 from labcrane.registry.registry import discover

@@ -14,10 +14,9 @@ from pydantic import ValidationError
 from tactor_board import serial_board, udp_board
 from virtual_sticks import desk
 
-from labcrane import DeviceError, Feedback, Frame, Run
+from labcrane import DeviceError, Feedback, Frame, Run, Tick
 from labcrane.cli.app import main
 from labcrane.core import SessionState, Within
-from labcrane.core.clock import Tick
 from labcrane.testing import TARGETS, FeedbackContract, ch8, make_run, make_target
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sphere.settings import SphereSettings

@@ -1,8 +1,6 @@
 """The view: where things are in its pictures, what colour they have, and when they are shown."""
 
 import math
-import os
-import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -10,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from needs import GRAPHICS, needs
+from programs import ran
 from windows import (
     MACHINE,
     POSE,
@@ -25,7 +24,7 @@ from windows import (
 
 from labcrane import DeviceError, Feedback
 from labcrane.core import SessionState, Sphere
-from labcrane.machines.kinematics import Arm
+from labcrane.machines import Arm
 from labcrane.testing import FeedbackContract, crane_at
 from labcrane_view.screen.monitors import parse
 from labcrane_view.settings import CAMERAS, ViewSettings
@@ -218,13 +217,7 @@ def x_server() -> Iterator[str]:
 def test_a_window_shows_the_newest_frame_and_is_never_late(x_server: str) -> None:
     # Each frame has a colour of its own; what the X server shows is read back after each.
     program = Path(__file__).with_name("late_frames.py")
-    done = subprocess.run(
-        [sys.executable, str(program)],
-        env={**os.environ, "DISPLAY": x_server},
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-    )
+    done = ran([sys.executable, str(program)], env={"DISPLAY": x_server})
     assert done.returncode == 0, done.stderr
     behind = [int(word) for word in done.stdout.split()]
     assert len(behind) == 30

@@ -2,7 +2,7 @@
 
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,13 +44,10 @@ def a_view(moves: str, bodies: tuple[Body, ...], *areas: str) -> Iterator[View]:
     settings = ViewSettings(
         camera="free", display="hidden", size=SIZE, hud=(), targets=False, shadow=0, areas=areas
     )
-    view = View(settings, MACHINE)
-    try:
+    with closing(View(settings, MACHINE)) as view:
         view.open(replace(run, state=state, bodies=(*run.bodies, *bodies)))
         view.present(moving(moves, AWAY, TURNS[0]))
         yield view
-    finally:
-        view.close()
 
 
 def box_drawn(view: View, moves: str, where: tuple[float, ...], turn: tuple[float, ...]) -> tuple:

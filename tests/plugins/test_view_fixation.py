@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from windows import SIZE, a_view, make_frame
 
-from labcrane.analysis.gaze import Glass, _glass
+from labcrane.analysis import Glass
+from labcrane.analysis.gaze import _glass
 from labcrane.core import SessionState
 from labcrane_view.fixation import DISC, GREY
 

@@ -7,14 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from rehearsal import loaded
 from windows import MACHINE, a_view, projected
 
 from labcrane import ProtocolError, Run
 from labcrane.machines import link_frames, reach
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import load
-from labcrane.recording.run_codec import read_run, write_run
-from labcrane.registry.registry import discover
 from labcrane_view.framing import framed, must_be_seen
 from labcrane_view.settings import CAMERAS, CameraSettings
 
@@ -24,9 +22,7 @@ SIZES = ((1280, 720), (1920, 1200), (1024, 768), (3860, 1080))
 
 @pytest.fixture(scope="module", params=STUDIES)
 def run(request: pytest.FixtureRequest) -> Run:
-    study = load(
-        Path(__file__).parents[2] / "protocols" / request.param / "protocol.yaml", discover()
-    )
+    study = loaded(Path(__file__).parents[2] / "protocols" / request.param / "protocol.yaml")
     return Rig.build(study, simulated=True).describe(study, participant_seed=0)
 
 
@@ -62,10 +58,6 @@ def test_all_pairs_and_the_tip_between_them_are_in_the_picture(
     must = np.array([projected(tuple(p), camera, size) for p in must_be_seen(run)])
     edges = np.minimum(must.min(axis=0), np.array(size) - must.max(axis=0)) / size
     assert edges.min() < 0.04
-
-
-def test_the_places_reach_the_processes_that_draw(run: Run) -> None:
-    assert read_run(write_run(run)).places == run.places
 
 
 def test_a_camera_that_cannot_hold_the_targets_is_refused() -> None:

@@ -1,6 +1,7 @@
 """Meshes and scenes in the view: read alike from every format, drawn where they are."""
 
 import struct
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -178,12 +179,10 @@ def test_a_link_is_drawn_as_its_mesh(tmp_path: Path) -> None:
     run = replace(make_run(machine, task=TARGETS), bodies=link_boxes(machine))
     view = View(ViewSettings(display="hidden", size=(640, 360), camera="free", hud=()), machine)
     view.open(run)
-    try:
+    with closing(view):
         view.present(make_frame())
         view.present(make_frame())
         rows, columns = np.nonzero(spots(view.picture()))
-    finally:
-        view.close()
     link = link_frames(machine, POSE)[len(machine.joints)]
     corners = (0.3 * POINTS + [-0.5, 0.0, 0.0]) @ link[:3, :3].T + link[:3, 3]
     camera = ViewSettings(camera="free").camera

@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from cranes import needs_bullet
 from needs import GRAPHICS, needs
+from rehearsal import loaded
 
 from labcrane import FloatArray, Frame, Run, Tick
 from labcrane.core import SessionState
@@ -27,8 +29,7 @@ from labcrane.machines import (
     write_placed,
 )
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import discover
+from labcrane.protocol.study import Study
 from labcrane.streams.context import situation_after, situation_of
 from labcrane.testing import make_trial
 from labcrane_view.areas import Projection
@@ -45,7 +46,7 @@ CAMERA = CameraSettings(eye=(1.7, -6.5, 2.4), look=(1.2, 0.0, 0.9), fov_deg=60)
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    return load(RETRIEVAL / "protocol.yaml", discover())
+    return loaded(RETRIEVAL / "protocol.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -66,10 +67,8 @@ def view(request, run: Run) -> Iterator[View]:
     )
     made = View(settings, run.machine)
     made.open(run)
-    try:
+    with closing(made):
         yield made
-    finally:
-        made.close()
 
 
 def make_frame(run: Run, things: tuple[PlacedObject, ...]) -> Frame:

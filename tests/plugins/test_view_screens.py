@@ -1,12 +1,12 @@
 """One picture over several monitors, and what happens when one of them is lost."""
 
-import os
 import subprocess
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from needs import need
+from programs import ran
 from pydantic import ValidationError
 from windows import SIZE, a_view, an_x_server, centre_of, make_frame, projected
 
@@ -39,9 +39,7 @@ def desktop(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def window_at(title: str) -> tuple[tuple[int, int], tuple[int, int]]:
-    done = subprocess.run(
-        ["xwininfo", "-name", title], env=os.environ, capture_output=True, text=True, check=True
-    )
+    done = ran(["xwininfo", "-name", title], check=True)
     said = dict(
         line.strip().rsplit(":", 1) for line in done.stdout.splitlines() if ":" in line.strip()
     )

@@ -15,6 +15,7 @@ import pytest
 from own_modules import OWN_MODULES
 from PIL import ImageGrab
 from plugins.whole_picture import counted
+from programs import ran
 from windows import a_view, an_x_server, make_frame
 
 from labcrane.testing import ch8
@@ -48,13 +49,7 @@ def moving(display: str, renderer: str, name: str, *bare: str) -> Iterator[dict[
 
 def windows(display: str) -> dict[str, tuple[int, int]]:
     """Return where the windows are that have a name, as the X server says."""
-    done = subprocess.run(
-        ["xwininfo", "-root", "-tree"],
-        env={**os.environ, "DISPLAY": display},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    done = ran(["xwininfo", "-root", "-tree"], env={"DISPLAY": display}, check=True)
     found = {}
     for line in done.stdout.splitlines():
         if ' - whole"' in line:

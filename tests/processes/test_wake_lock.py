@@ -9,7 +9,7 @@ from needs import needs
 from rehearsal import SHORT, ScriptedConsole, a_study
 
 import labcrane
-from labcrane.core.findings import Verdict
+from labcrane.core import Verdict
 from labcrane.doctor.screen import examine
 from labcrane.processes import wake_lock as module
 from labcrane.processes.wake_lock import PROGRAMS, WakeLock, wake_lock

@@ -5,12 +5,11 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from rehearsal import SHORT
+from rehearsal import SHORT, loaded
 
 from labcrane import ProtocolError
-from labcrane.errors import look, meant
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
+from labcrane.core import look
+from labcrane.errors import meant
 
 PRECOMPOSED = "éüñçåöÅŻó"
 UNSEEN = ["\u200b", "\u200d", "\ufeff", "\u00ad", "\u2060"]
@@ -45,7 +44,7 @@ def checked(folder: Path, design: str, more: str = "") -> None:
     )
     path = folder / "study.yaml"
     path.write_text(text, encoding="utf-8")
-    load(path, discover())
+    loaded(path)
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -3,15 +3,14 @@
 from pathlib import Path
 
 import pytest
+from rehearsal import loaded
 from results.undrawn import without_figures
 from simple_crane import CRANE
 
-from labcrane.analysis.cohort import find_cohort
+from labcrane import ProtocolError
+from labcrane.analysis import find_cohort
 from labcrane.analysis.report.report import write_report
 from labcrane.cli.app import main
-from labcrane.errors import ProtocolError
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 
 STUDY = (
     """\
@@ -39,14 +38,14 @@ def refusal(folder: Path, text: str) -> str:
     path = folder / "protocol.yaml"
     path.write_text(text)
     with pytest.raises(ProtocolError) as caught:
-        load(path, discover())
+        loaded(path)
     return str(caught.value)
 
 
 def test_a_result_of_a_task_and_a_measure_of_a_movement_can_be_primary(tmp_path: Path) -> None:
     path = tmp_path / "protocol.yaml"
     path.write_text(STUDY)
-    assert load(path, discover()).protocol.design.primary == ("circle_to_circle", "sparc")
+    assert loaded(path).protocol.design.primary == ("circle_to_circle", "sparc")
 
 
 def test_an_outcome_that_nothing_gives_is_refused_with_its_line_and_what_there_is(

@@ -13,11 +13,10 @@ import pytest
 from rehearsal import SHORT, said_of
 
 import labcrane
-from labcrane import ProtocolError, Settings
-from labcrane.core import ButtonName, Covers, JointName, Layout, Once
+from labcrane import InputDevice, ProtocolError, Settings
+from labcrane.core import ButtonName, Covers, JointName, Layout, Once, Reference
 from labcrane.core.events import CODES, KINDS
-from labcrane.core.references import Mentioned, Reference, mentioned
-from labcrane.core.roles import InputDevice
+from labcrane.core.references import Mentioned, mentioned
 from labcrane.machines import load_machine
 from labcrane.protocol.protocol import Participants
 from labcrane.protocol.questions import questions

@@ -10,14 +10,10 @@ from pathlib import Path
 import pytest
 from needs import need
 
-from labcrane.errors import RecordingError
+from labcrane import RecordingError
 from labcrane.files import atomic
-from labcrane.recording.annotations import (
-    annotate,
-    annotations_path,
-    read_annotations,
-    withdraw,
-)
+from labcrane.recording import annotate, read_annotations, withdraw
+from labcrane.recording.annotations import annotations_path
 
 
 @pytest.fixture

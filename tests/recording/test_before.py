@@ -8,7 +8,6 @@ import gzip
 import json
 import math
 import shutil
-import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,10 +18,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import pyxdf
+from programs import ran
 
 import labcrane
+from labcrane.analysis import movements_of
 from labcrane.analysis.measures import measure_session
-from labcrane.analysis.movements import movements_of
 
 BEFORE = Path(__file__).parent / "before"
 NAME = "P001-SIMULATED"
@@ -60,12 +60,7 @@ OF_THE_JOURNAL = {"ses-01/journals/size", "ses-01/context"}
 
 
 def labcrane_command(*arguments: str | Path) -> str:
-    done = subprocess.run(
-        [sys.executable, "-m", "labcrane", *map(str, arguments)],
-        check=False,
-        capture_output=True,
-        encoding="utf-8",
-    )
+    done = ran([sys.executable, "-m", "labcrane", *map(str, arguments)])
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

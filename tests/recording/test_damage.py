@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from recording.journals import COLUMNS, START, frames, stamp, write
 
 from labcrane import RecordingError
+from labcrane.recording import Channel, StreamHeader
 from labcrane.recording.xdf import writer as xdf
 from labcrane.recording.xdf.chunk import BOUNDARY, MAGIC, Tag, pack, pack_numbers, pack_stream
-from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.recording.xdf.reader import XdfFile, read_xdf
 
 COUNT = 30

@@ -11,7 +11,7 @@ import av
 import numpy as np
 import pytest
 
-from labcrane.errors import RecordingError
+from labcrane import RecordingError
 from labcrane.recording.films.footage import Footage
 
 BLOCK, BITS, RATE = 16, 12, 30

@@ -11,19 +11,17 @@ import pytest
 import pyxdf
 from recording.journals import write
 
-from labcrane import RecordingError
+from labcrane import RecordingError, open_recording
 from labcrane.files.lock import alone_in
+from labcrane.recording import Channel, StreamHeader, XdfWriter
 from labcrane.recording.foreign_streams import (
     RecordedStream,
     companion_headers,
 )
-from labcrane.recording.participant_file.reader import open_recording
 from labcrane.recording.participant_file.recorrect import read_stream, recorrect
 from labcrane.recording.participant_file.recover import recover
 from labcrane.recording.participant_file.stream_group import write_time, write_uncorrected
 from labcrane.recording.participant_file.writer import consolidate
-from labcrane.recording.xdf.header import Channel, StreamHeader
-from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.session import postprocess
 
 EEG = StreamHeader(

@@ -1,6 +1,5 @@
 """Full and read-only disks: real ones, in a user namespace."""
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import pytest
 from needs import UNSHARE, needs
 from own_modules import OWN_MODULES
+from programs import ran
 
 needs_mounts = needs("mounts")
 
@@ -47,12 +47,9 @@ print("went on")
 
 def in_namespace(mount: str, script: str, folder: Path) -> subprocess.CompletedProcess[str]:
     command = f'mount -t tmpfs -o {mount} none "$0" && exec "$@"'
-    return subprocess.run(
+    return ran(
         [*UNSHARE, "sh", "-c", command, str(folder), sys.executable, "-c", script, str(folder)],
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-        env={**os.environ, "PYTHONPATH": OWN_MODULES},
+        env={"PYTHONPATH": OWN_MODULES},
     )
 
 

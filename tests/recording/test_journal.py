@@ -9,10 +9,9 @@ import pytest
 
 from labcrane import PluginError, RecordingError
 from labcrane.core import Event
+from labcrane.recording import Channel, StreamHeader, XdfWriter
 from labcrane.recording.journal import Column, SessionJournal, event_text
 from labcrane.recording.journal_reader import UNREADABLE, read_journal
-from labcrane.recording.xdf.header import Channel, StreamHeader
-from labcrane.recording.xdf.writer import XdfWriter
 
 
 class Colour(StrEnum):

@@ -15,7 +15,7 @@ from own_modules import OWN_MODULES
 from recording import journals
 from recording.journals import frames, stamp, write
 
-from labcrane.recording.participant_file.reader import open_recording
+from labcrane import open_recording
 from labcrane.recording.participant_file.recover import recover
 from labcrane.recording.participant_file.writer import consolidate
 from labcrane.recording.paths import next_part

@@ -8,7 +8,8 @@ import pytest
 from docs.page import ROOT
 
 from labcrane.core.events import CODES, KINDS, OTHER, PULSES
-from labcrane.recording.labels import LONGEST, labelled, plain
+from labcrane.recording import labelled
+from labcrane.recording.labels import LONGEST, plain
 from labcrane.session.commands import Order
 
 BLOCK = {"block": 2, "block_name": "learning", "task": "aiming", "practice": False}

@@ -1,5 +1,4 @@
 import json
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -8,13 +7,14 @@ import h5py
 import numpy as np
 import pytest
 from needs import needs
+from programs import ran
 from recording.journals import COLUMNS, CONTEXT, frames, stamp, write
 
-from labcrane import RecordingError
+from labcrane import RecordingError, open_recording
+from labcrane.recording import Recording
 from labcrane.recording.frame_log import LOOP
 from labcrane.recording.journal import Column, SessionJournal
 from labcrane.recording.participant_file import writer
-from labcrane.recording.participant_file.reader import Recording, open_recording
 from labcrane.recording.participant_file.recover import recover
 from labcrane.recording.participant_file.writer import consolidate
 from labcrane.recording.xdf.reader import read_xdf
@@ -307,7 +307,5 @@ def test_importing_the_reader_loads_neither_pandas_nor_h5py() -> None:
         "import sys, json, labcrane.recording.participant_file.recover;"
         "print(json.dumps([m for m in ('pandas', 'h5py') if m in sys.modules]))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, check=True, encoding="utf-8"
-    )
+    done = ran([sys.executable, "-c", code], check=True)
     assert json.loads(done.stdout) == []

@@ -10,7 +10,7 @@ import pytest
 from recording.journals import COLUMNS, frames, stamp, write
 
 from labcrane import RecordingError, open_recording
-from labcrane.core.records import Event
+from labcrane.core import Event
 from labcrane.recording.journal import Column, SessionJournal
 from labcrane.recording.participant_file.column_writer import ColumnWriter
 from labcrane.recording.participant_file.writer import consolidate

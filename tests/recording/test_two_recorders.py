@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from labcrane.recording import Channel, StreamHeader, XdfWriter
 from labcrane.recording.foreign_streams import OPENED, RESET, SIGNAL, read_streams
 from labcrane.recording.paths import part_path
-from labcrane.recording.xdf.header import Channel, StreamHeader
-from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.probes import Probe
 from labcrane.streams.recorder.companions import RecordedStreamWriter
 from labcrane.streams.sync.raw import raw_of

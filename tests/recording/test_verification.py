@@ -11,6 +11,7 @@ import pytest
 from recording.journals import CONTEXT, write
 
 from labcrane import RecordingError
+from labcrane.recording import Channel, StreamHeader, XdfWriter
 from labcrane.recording.foreign_streams import read_streams
 from labcrane.recording.participant_file import recorrect as recorrect_module
 from labcrane.recording.participant_file import relabel as relabel_module
@@ -19,8 +20,6 @@ from labcrane.recording.participant_file.about import ABOUT
 from labcrane.recording.participant_file.recorrect import recorrect
 from labcrane.recording.participant_file.relabel import relabel_journal, relabel_participant_file
 from labcrane.recording.participant_file.writer import consolidate
-from labcrane.recording.xdf.header import Channel, StreamHeader
-from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.session.postprocess import conclude
 
 SEEDS = range(25)

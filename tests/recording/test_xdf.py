@@ -7,12 +7,12 @@ import pyxdf
 from recording.journals import COLUMNS, RATE_HZ, frames, stamp, write
 
 from labcrane import RecordingError
+from labcrane.recording import Channel, StreamHeader, XdfWriter
 from labcrane.recording.paths import next_part, part_number, parts, session_of
 from labcrane.recording.xdf import writer as xdf
 from labcrane.recording.xdf.chunk import BOUNDARY, Tag, pack, samples_head
-from labcrane.recording.xdf.header import FORMATS, Channel, StreamHeader
+from labcrane.recording.xdf.header import FORMATS
 from labcrane.recording.xdf.reader import read_xdf
-from labcrane.recording.xdf.writer import XdfWriter
 
 NUMBERS = [form for form in FORMATS if form != "string"]
 

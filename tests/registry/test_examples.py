@@ -10,7 +10,7 @@ import pytest
 from fresh_environment import environment_with, run
 
 from labcrane import open_recording
-from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.recording import SessionRecord
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NAMES = sorted(path.parent.name for path in EXAMPLES.glob("*/pyproject.toml"))

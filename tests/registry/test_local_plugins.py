@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from faults.sessions import finished, unique
 from faults.sessions import labcrane as command
-from faults.sessions import unique
 from rehearsal import SHORT
 
 from labcrane import Cue, PluginError, ProtocolError, open_recording
@@ -165,9 +165,7 @@ def test_a_changed_file_is_not_what_was_approved(protocol: Path) -> None:
 def test_processes_of_a_session_find_it_and_its_source_is_recorded(protocol: Path) -> None:
     data = protocol.parent / "data"
     arguments = ("--participant", "P001", "--simulate", "--feedback", "--data", data)
-    done = command("run", protocol, *arguments)
-    said, _ = done.communicate(timeout=240)
-    assert done.returncode == 0, said
+    finished(command("run", protocol, *arguments))
     session = open_recording(data / "P001-SIMULATED" / "P001-SIMULATED.h5").session(1)
     assert session.context["components"]["feedback.ball"]["plugin"] == "plugins/arrow.py"
     assert session.context["own_plugins"] == {"plugins/arrow.py": ARROW}

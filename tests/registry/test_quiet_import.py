@@ -1,9 +1,10 @@
 """Modules that greet from C do not fill the terminal, and nothing else is hidden."""
 
-import os
 import subprocess
 import sys
 from pathlib import Path
+
+from programs import ran
 
 GREETING = 'import os\nos.write(2, b"hello from C\\n")\nplace = "here"\n'
 
@@ -13,16 +14,13 @@ def said(program: str, folder: Path) -> "subprocess.CompletedProcess[str]":
     (folder / "broken.py").write_text(
         GREETING + 'raise OSError("no such engine")\n', encoding="utf-8"
     )
-    return subprocess.run(
+    return ran(
         [
             sys.executable,
             "-c",
             f"import os\nfrom labcrane.registry import quietly_imported\n{program}",
         ],
-        env={**os.environ, "PYTHONPATH": str(folder)},
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
+        env={"PYTHONPATH": str(folder)},
     )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from governed import Willing
 
-from labcrane.core.records import Event
+from labcrane.core import Event
 from labcrane.session.commands import Command, Order
 
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from governed import GOVERNED, Lab
 
-from labcrane.analysis.cohort import Status, find_cohort
+from labcrane.analysis import find_cohort
+from labcrane.analysis.cohort import Status
 from labcrane.cli.app import main
 from labcrane.session.session import run
 from results.answering import Answering

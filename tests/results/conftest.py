@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 from once import made_once
 
-from labcrane.analysis.cohort import Cohort, Status, find_cohort
+from labcrane.analysis import find_cohort
+from labcrane.analysis.cohort import Cohort, Status
 from labcrane.participants.folders import Places
 from labcrane.participants.register import Tombstone, changed
 from labcrane.session.commands import Command, Order

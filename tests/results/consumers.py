@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from needs import needs
+from programs import ran
 
 needs_r = needs("Rscript", "afex", "hdf5r", "rhdf5")
 needs_emmeans = needs("Rscript", "afex", "emmeans")
@@ -29,9 +30,7 @@ def octave(script: str, argument: object) -> str:
 def bids_errors(folder: Path) -> list[str]:
     """Return what the BIDS validator calls an error in a data set: code and file."""
     program = Path(sys.executable).with_name("bids-validator-deno")
-    done = subprocess.run(
-        [program, "--json", folder], capture_output=True, encoding="utf-8", check=False
-    )
+    done = ran([program, "--json", folder])
     issues = json.loads(done.stdout)["issues"]["issues"]
     return [f"{i['code']} {i.get('location')}" for i in issues if i["severity"] == "error"]
 

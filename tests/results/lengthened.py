@@ -1,12 +1,12 @@
 """Recordings made long: the same session, whose signals go on."""
 
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
+from programs import ran
 
 from labcrane.recording.journal import GROUPS
 
@@ -79,6 +79,6 @@ sys.exit(status)
 def megabytes(*words: object) -> float:
     """Return how much a command had in memory at most, in a process of its own."""
     run = [sys.executable, "-c", MEASURED, *map(str, words)]
-    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    done = ran(run)
     assert done.returncode == 0, done.stderr
     return int(done.stdout.splitlines()[-1]) / 1024

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -11,12 +10,13 @@ import pandas as pd
 import pytest
 import pyxdf
 from needs import needs
+from programs import ran
 from scipy.io import loadmat
 
 from labcrane import open_recording
 from labcrane.analysis.cohort import Cohort
 from labcrane.cli.app import main
-from labcrane.recording.annotations import annotate, withdraw
+from labcrane.recording import annotate, withdraw
 from results.undrawn import without_figures
 
 TEXTS = ("looked at the phone", "BAD_movement of the head", "„krumm“, with\na second line")
@@ -118,8 +118,6 @@ def test_mne_has_the_marks_at_their_samples_and_leaves_out_what_was_marked_bad(
         " if abs(a['duration'] - 2.25) < 0.001]))"
     )
     file = marked / "P001" / "P001.h5"
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(file)], check=True, capture_output=True, text=True
-    )
+    done = ran([sys.executable, "-c", code, str(file)], check=True)
     texts = json.loads(done.stdout.splitlines()[-1])
     assert texts == [TEXTS[1], f"annotation/{TEXTS[2]}", f"annotation/{TEXTS[0]}"]

@@ -5,21 +5,22 @@ import hashlib
 import io
 import json
 import random
-import subprocess
 import zipfile
 from pathlib import Path
 
 import h5py
 import pytest
 from needs import needs
+from programs import ran
 from rehearsal import SHORT, ScriptedConsole, a_study
 from ruamel.yaml import YAML
 
 from labcrane import ProtocolError, RecordingError, open_recording
-from labcrane.analysis.cohort import Cohort, find_cohort
+from labcrane.analysis import find_cohort
+from labcrane.analysis.cohort import Cohort
 from labcrane.cli.app import main
-from labcrane.participants.personal_data import personal_in
-from labcrane.recording.participant_file.about import citation
+from labcrane.participants import personal_in
+from labcrane.recording import citation
 from labcrane.session.session import Visit, run
 from labcrane_tables.archive import CHECKSUMS, Archive
 from labcrane_tables.settings import ArchiveSettings
@@ -75,9 +76,7 @@ def test_the_archive_has_what_a_repository_asks_for(archive: Path, cohort: Cohor
 @needs("sha256sum")
 def test_every_file_is_checked_by_sha256sum(archive: Path, tmp_path: Path) -> None:
     zipfile.ZipFile(archive).extractall(tmp_path)
-    done = subprocess.run(
-        ["sha256sum", "-c", CHECKSUMS], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = ran(["sha256sum", "-c", CHECKSUMS], cwd=tmp_path)
     assert done.returncode == 0, done.stdout
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert done.stdout.count(": OK") == len(files) - 1

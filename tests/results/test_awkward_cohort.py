@@ -11,7 +11,7 @@ import pytest
 from scipy.io import loadmat, savemat
 
 import labcrane
-from labcrane.analysis.measures import measures_of
+from labcrane.analysis import measures_of
 from labcrane.approval.codebook import codebook
 from labcrane.cli.app import main
 from results.awkward import ANSWERS, FORMULA, HALF_FINISHED, NULL, Awkward

@@ -14,8 +14,8 @@ import pytest
 from needs import needs
 
 from labcrane import ProtocolError
-from labcrane.analysis.cohort import Cohort, find_cohort
-from labcrane.analysis.measures import measures_of
+from labcrane.analysis import find_cohort, measures_of
+from labcrane.analysis.cohort import Cohort
 from labcrane.design.plan import plan_session
 from labcrane.testing import ch8
 from labcrane_bids.bids import Bids

@@ -11,11 +11,10 @@ import pytest
 from needs import needs
 from numpy.random import Generator, default_rng
 
-from labcrane.analysis import to_mne
-from labcrane.analysis.cohort import find_cohort
+from labcrane import FloatArray
+from labcrane.analysis import find_cohort, to_mne
 from labcrane.recording import Channel, SessionRecord, StreamHeader, XdfWriter
 from labcrane.testing import ch8
-from labcrane.types import FloatArray
 from labcrane_bids.bids import Bids
 from labcrane_bids.settings import BidsSettings
 from results.consumers import bids_errors

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from needs import needs
 
-from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis import find_cohort
 from labcrane.session.commands import FeedbackReady
 from labcrane.testing import ch8
 from labcrane_bids.bids import Bids

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from labcrane import ProtocolError, RecordingError
-from labcrane.analysis.cohort import Cohort, Status, find_cohort
+from labcrane.analysis import find_cohort
+from labcrane.analysis.cohort import Cohort, Status
 from labcrane.cli.app import main
 from results.recorded import STUDY, record, study
 

@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 from needs import needs
 
-from labcrane.analysis import to_mne
-from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis import find_cohort, to_mne
 from labcrane.recording import SessionRecord
 from labcrane.session.commands import Command, Order
 from labcrane.testing import ch8

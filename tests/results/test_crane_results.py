@@ -12,7 +12,7 @@ import pytest
 from cranes import needs_mujoco
 from needs import needs
 
-from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis import find_cohort
 from labcrane.analysis.quality import is_result
 from labcrane.analysis.report.factors import with_factors
 from labcrane.analysis.statistics.anova import Contrast, compare

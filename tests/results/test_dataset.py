@@ -11,9 +11,9 @@ import pyarrow.dataset as ds
 import pytest
 
 from labcrane import RecordingError
-from labcrane.analysis import Dataset
-from labcrane.analysis.cohort import Cohort, Participant
-from labcrane.analysis.measures import DEFAULTS, MeasureSettings, measure_session, measures_of
+from labcrane.analysis import Dataset, Participant, measures_of
+from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.measures import DEFAULTS, MeasureSettings, measure_session
 from labcrane.analysis.tables import measure_cache
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from simple_crane import CRANE
 
-from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis import find_cohort
 from labcrane.analysis.quality import is_result
 from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.report.report import write_report

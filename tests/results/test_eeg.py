@@ -14,10 +14,10 @@ from docs.page import blocks
 from needs import needs
 
 from labcrane import RecordingError
-from labcrane.analysis import sampled, to_mne
+from labcrane.analysis import sampled, to_mne, volts
 from labcrane.analysis.cohort import Cohort
-from labcrane.analysis.electrodes.mne import volts
-from labcrane.core.events import HED_VERSION, KINDS
+from labcrane.core import HED_VERSION
+from labcrane.core.events import KINDS
 from labcrane.recording import SessionRecord
 from labcrane.testing import ch8
 from labcrane_bids.bids import Bids

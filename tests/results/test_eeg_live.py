@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pylsl
 import pytest
-from faults.sessions import labcrane, unique
+from faults.sessions import finished, labcrane, unique
 from needs import needs
 from rehearsal import SHORT
 
@@ -103,9 +103,7 @@ def test_epochs_by_label_have_the_amplifiers_pulse_within_one_sample(tmp_path: P
     (tmp_path / "study.yaml").write_text(text, encoding="utf-8")
     asked = ("--participant", "P001", "--simulate", "--data", tmp_path / "data")
     with amplifier.running():
-        process = labcrane("run", tmp_path / "study.yaml", *asked)
-        said, _ = process.communicate(timeout=240)
-    assert process.returncode == 0, said
+        finished(labcrane("run", tmp_path / "study.yaml", *asked))
     (path,) = tmp_path.glob("data/*/*.h5")
     session = open_recording(path).session(1)
     raw = to_mne(session)

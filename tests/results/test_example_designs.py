@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from rehearsal import loaded
 
 from labcrane.cli.app import main
 from labcrane.design.plan import plan_session
-from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import discover
+from labcrane.protocol.study import Study
 from labcrane.simulation.foreseen import foreseen_tests, in_words
 from results.consumers import needs_r, r
 from results.undrawn import without_figures
@@ -24,7 +24,7 @@ ALONE = "with pairs' means taken away"
 
 
 def study_of(name: str) -> Study:
-    return load(DESIGNS / name / "protocol.yaml", discover())
+    return loaded(DESIGNS / name / "protocol.yaml")
 
 
 def test_every_design_is_tried() -> None:
@@ -156,7 +156,7 @@ def test_a_rehearsal_says_what_the_plan_cannot_tell_apart(tmp_path: Path) -> Non
         text.replace("condition: latin_square", "condition: as_written")
     )
     shutil.copy(DESIGNS / "crossover" / "instructions.md", tmp_path)
-    tests = foreseen_tests(load(tmp_path / "protocol.yaml", discover())).set_index("factor")
+    tests = foreseen_tests(loaded(tmp_path / "protocol.yaml")).set_index("factor")
     said = tests["confounded"]
     assert (said["condition"], said["block"]) == (
         "the order in which conditions came",

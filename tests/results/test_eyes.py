@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
-from labcrane import RecordingError, open_recording
-from labcrane.analysis.codebook import codebook_of
-from labcrane.analysis.cohort import find_cohort
+from labcrane import FloatArray, RecordingError, open_recording
+from labcrane.analysis import codebook_of, find_cohort, measures_of
 from labcrane.analysis.gaze import Looks, looks
-from labcrane.analysis.measures import MeasureSettings, measure_session, measures_of
+from labcrane.analysis.measures import MeasureSettings, measure_session
 from labcrane.core import SignalChannel, eyes_of
 from labcrane.recording import Channel, SessionRecord, StreamHeader, XdfWriter
-from labcrane.types import FloatArray
 from results.recorded import STUDY, record, study, write_stream
 
 LIMIT = 0.6

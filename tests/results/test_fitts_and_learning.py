@@ -8,8 +8,7 @@ import pandas as pd
 import pytest
 from scipy.optimize import curve_fit
 
-from labcrane.analysis.cohort import find_cohort
-from labcrane.analysis.measures import measures_of
+from labcrane.analysis import find_cohort, measures_of
 from labcrane.analysis.statistics.fitts import (
     WIDTH_FACTOR,
     difficulty,

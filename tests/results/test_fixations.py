@@ -7,12 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from labcrane import open_recording
-from labcrane.analysis.cohort import find_cohort
+from labcrane import FloatArray, open_recording
+from labcrane.analysis import find_cohort
 from labcrane.analysis.gaze import FIXATIONS, fixations
 from labcrane.analysis.report.report import write_report
 from labcrane.session.commands import FeedbackReady
-from labcrane.types import FloatArray
 from labcrane_tables.settings import TableSettings
 from labcrane_tables.tables import Tables
 from results.recorded import STUDY, record, study

@@ -10,14 +10,13 @@ import pandas as pd
 import pytest
 
 from labcrane import RecordingError, open_recording
-from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis import find_cohort, gaze_space
 from labcrane.analysis.gaze import looks
-from labcrane.analysis.gaze_streams import gaze_space, unmeasured, window_stream
+from labcrane.analysis.gaze_streams import unmeasured, window_stream
 from labcrane.analysis.measures import MeasureSettings, measure_session
 from labcrane.analysis.report.report import write_report
 from labcrane.cli.app import main
-from labcrane.recording import SessionRecord, Stream
-from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.recording import Channel, SessionRecord, Stream, StreamHeader
 from labcrane.web.viewer.glances import Glances
 from results.recorded import STUDY, record, study
 from results.undrawn import without_figures

@@ -8,8 +8,8 @@ import pytest
 from scipy.io import loadmat
 
 from labcrane import RecordingError
+from labcrane.analysis import measures_of
 from labcrane.analysis.cohort import Cohort
-from labcrane.analysis.measures import measures_of
 from labcrane_matlab import matlab
 from labcrane_matlab.matlab import Matlab, fields
 from labcrane_matlab.settings import MatlabSettings

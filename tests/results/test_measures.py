@@ -7,13 +7,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from labcrane.analysis import Movement, measures_of, with_unseen_areas
 from labcrane.analysis.cohort import Cohort
-from labcrane.analysis.gaze import Looks, gaze_measures, looks, with_unseen_areas
-from labcrane.analysis.measures import MeasureSettings, measure_session, measures_of
-from labcrane.analysis.movements import Movement, cut, groups, machine_of
+from labcrane.analysis.gaze import Looks, gaze_measures, looks
+from labcrane.analysis.measures import MeasureSettings, measure_session
+from labcrane.analysis.movements import cut, groups, machine_of
 from labcrane.analysis.sticks import reversals
 from labcrane.analysis.tables.definitions import MEASURES
-from labcrane.testing.exporters import MOVEMENT_S, make_participant
+from labcrane.testing import make_participant
+from labcrane.testing.exporters import MOVEMENT_S
 
 
 def test_a_minimum_jerk_movement_has_its_closed_forms(tmp_path) -> None:
@@ -54,7 +56,7 @@ def test_settings_change_what_depends_on_them(cohort: Cohort) -> None:
 
 
 def test_a_movement_without_an_end_has_no_measures_but_its_error(data) -> None:
-    from labcrane.analysis.cohort import find_cohort
+    from labcrane.analysis import find_cohort
 
     ended = measures_of(find_cohort(data, ["half-finished"]).included[2]).iloc[-1]
     assert ended["outcome"] == "ended"

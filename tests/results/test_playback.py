@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from faults.sessions import unique
-from rehearsal import ScriptedConsole, a_study
+from rehearsal import ScriptedConsole, a_study, simulated_file
 from simple_crane import FORM
 
-from labcrane import open_recording
+from labcrane import RecordingError, open_recording
 from labcrane.cli.app import main
-from labcrane.core.records import SessionState
-from labcrane.errors import RecordingError
+from labcrane.core import SessionState
 from labcrane.feedback.playback import played
 from labcrane.recording.recorded_frames import RecordedFrames
 from labcrane.session.commands import Command, Order
@@ -31,12 +30,7 @@ STUDY = (
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("shown")
-    protocol = folder / "study.yaml"
-    protocol.write_text(STUDY.format(study=unique("shown")))
-    words = ["run", str(protocol), "--participant", "P001", "--simulate", "--fast"]
-    assert main([*words, "--data", str(folder / "data")]) == 0
-    return folder / "data" / "P001-SIMULATED" / "P001-SIMULATED.h5"
+    return simulated_file(tmp_path_factory.mktemp("shown"), STUDY.format(study=unique("shown")))
 
 
 class Clock:

@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 
 import labcrane as lab
+from labcrane.analysis import PRESENTED
 from labcrane.analysis.codebook import trial_codebook
 from labcrane.analysis.measures import measure_session
 from labcrane.analysis.presented import (
-    PRESENTED,
     PresentedLimits,
     _fewest,
     not_presented,
@@ -22,10 +22,11 @@ from labcrane.analysis.quality import exclusions, is_result, verdict_of_stamps
 from labcrane.analysis.report.answer import _exclusions
 from labcrane.analysis.report.outcomes import practised
 from labcrane.analysis.statistics.time_outs import time_outs
-from labcrane.core.findings import Finding, Verdict, worst
+from labcrane.core import Finding, Verdict
+from labcrane.core.findings import worst
 from labcrane.launcher.launcher import Outcome
 from labcrane.launcher.pages import left_behind
-from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.recording import SessionRecord
 from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Message, Order
 from labcrane.session.visit import visit_of
 from labcrane.streams.feedback_log import log_name

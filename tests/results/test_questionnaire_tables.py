@@ -9,10 +9,10 @@ import pytest
 from governed import GOVERNED, Lab
 from needs import needs
 
-from labcrane.analysis.cohort import Cohort, find_cohort
-from labcrane.analysis.questionnaires import answers_of, scores_of
+from labcrane import open_recording
+from labcrane.analysis import answers_of, find_cohort, scores_of
+from labcrane.analysis.cohort import Cohort
 from labcrane.cli.app import main
-from labcrane.recording.participant_file.reader import open_recording
 from labcrane.session.session import run
 from results.answering import Answering
 from results.consumers import r

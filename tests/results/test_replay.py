@@ -9,10 +9,10 @@ from cranes import engines
 from rehearsal import SHORT, a_study
 
 import labcrane
-from labcrane import Frame, ProtocolError, RecordingError
+from labcrane import Frame, ProtocolError, RecordingError, open_recording
 from labcrane.analysis.measures import measure_session
 from labcrane.cli.app import main
-from labcrane.recording.participant_file.reader import Stream, open_recording
+from labcrane.recording import Stream
 from labcrane.replay import replay_session
 from labcrane.replay.restore import restored_study
 from labcrane.session.commands import Command, Order, StreamBack, StreamLost

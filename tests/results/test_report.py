@@ -11,8 +11,9 @@ import pytest
 from rehearsal import SHORT
 from scipy.stats import ttest_rel
 
-from labcrane.analysis.cohort import Cohort, Status, find_cohort
-from labcrane.analysis.measures import measures_of, measures_of_trials
+from labcrane.analysis import find_cohort, measures_of
+from labcrane.analysis.cohort import Cohort, Status
+from labcrane.analysis.measures import measures_of_trials
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
 from labcrane.analysis.report import figures, report
 from labcrane.analysis.report.factors import factors_of, with_factors

@@ -13,7 +13,7 @@ from matplotlib.text import Text
 from pages.looks import check
 from pages.room import a_browser
 
-from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis import find_cohort
 from labcrane.analysis.report import figures
 from labcrane.analysis.report.answer import answer
 from labcrane.analysis.report.factors import factors_of, with_factors

@@ -11,9 +11,9 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from labcrane.analysis.cohort import Cohort, find_cohort
-from labcrane.analysis.measures import measures_of
-from labcrane.core.records import Event
+from labcrane.analysis import find_cohort, measures_of
+from labcrane.analysis.cohort import Cohort
+from labcrane.core import Event
 from labcrane.recording.labels import Labels
 from labcrane_tables.psychds import PsychDs
 from labcrane_tables.settings import PsychDsSettings, TableSettings

@@ -10,6 +10,7 @@ from random import Random
 
 import pytest
 from needs import UNSHARE, needs
+from programs import ran
 from rehearsal import SHORT
 
 from labcrane.analysis import measures
@@ -57,10 +58,7 @@ def test_a_full_disk_stops_a_product_and_leaves_nobody_out(simulated: Path, prod
     )
     mounted = f'mount -t tmpfs -o size={kilobytes}k none /mnt && exec "$0" -c "$@"'
     words = command(simulated, product, Path("/mnt/out"))
-    done = subprocess.run(
-        [*UNSHARE, "sh", "-c", mounted, sys.executable, code, *words],
-        capture_output=True, text=True, check=False, timeout=300,
-    )  # fmt: skip
+    done = ran([*UNSHARE, "sh", "-c", mounted, sys.executable, code, *words], timeout=300)
     assert done.returncode == 1, done.stdout + done.stderr
     assert "No space left on device" in done.stderr
     assert "Traceback" not in done.stderr

@@ -9,7 +9,7 @@ import pytest
 from once import made_once
 from scipy.stats import f_oneway
 
-from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis import find_cohort
 from labcrane.design.plan import plan_session
 from labcrane.protocol.study import Study
 from labcrane_matlab.matlab import Matlab

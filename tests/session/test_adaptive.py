@@ -13,7 +13,7 @@ from labcrane.approval.codebook import codebook
 from labcrane.cli.app import main
 from labcrane.design.plan import plan_session
 from labcrane.design.tracks import standing
-from labcrane.replay.replay import replay_session
+from labcrane.replay import replay_session
 from labcrane.session.commands import Command, Order
 from labcrane.session.resume import progress, remaining
 from labcrane.session.session import record, run

@@ -6,7 +6,7 @@ import pytest
 
 from labcrane.analysis.scoring.indicator import Performance, indicate
 from labcrane.analysis.scoring.settings import COUNTS, IndicatorSettings
-from labcrane.core.records import Event
+from labcrane.core import Event
 from labcrane.session.commands import Order
 from labcrane.web.assessment import LIVE, Assessment
 from labcrane.web.server.access import RIGHTS

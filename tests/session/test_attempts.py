@@ -12,11 +12,12 @@ import pandas as pd
 import pytest
 from rehearsal import SHORT, DiesError, DiesInTrial, StallingClock, a_study, rehearse
 
-from labcrane.core.records import PlannedTrial, Trial
+from labcrane import Trial, open_recording
+from labcrane.core import PlannedTrial
 from labcrane.design.tracks import LEVEL, PlannedTrack, plan_rounds
 from labcrane.protocol.study import Study
 from labcrane.protocol.tracks import Track, UpDown
-from labcrane.recording.participant_file.reader import SessionRecord, open_recording
+from labcrane.recording import SessionRecord
 from labcrane.replay import replay_session
 from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.session import Visit, run

@@ -9,14 +9,13 @@ import pytest
 from rehearsal import SHORT, ScriptedConsole, a_study
 from rich.console import Console
 
-from labcrane import ProtocolError
+from labcrane import ProtocolError, open_recording
 from labcrane.cli.terminal import Terminal
-from labcrane.core import Event
-from labcrane.core.records import SessionState, is_done
+from labcrane.core import Event, SessionState
+from labcrane.core.records import is_done
 from labcrane.design.counts import TrialCounts, numbers, spans
 from labcrane.design.plan import SessionPlan, plan_session
 from labcrane.recording.journal_reader import read_journal
-from labcrane.recording.participant_file.reader import open_recording
 from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.eligibility import EXEMPT
 from labcrane.session.session import outlook, run, still_owed

@@ -6,7 +6,7 @@ import pytest
 from rehearsal import SHORT, a_study, rehearse
 
 from labcrane import ProtocolError
-from labcrane.core.records import Event, SessionState
+from labcrane.core import Event, SessionState
 from labcrane.session.commands import Command, Order
 from labcrane.streams.context import situation_after
 

@@ -10,16 +10,15 @@ import pytest
 from rehearsal import DiesError, ScriptedConsole
 from simple_crane import CRANE
 
-from labcrane import ProtocolError, open_recording
-from labcrane.analysis.cohort import find_cohort
+from labcrane import ProtocolError, Tick, open_recording
+from labcrane.analysis import find_cohort
 from labcrane.analysis.scoring.operator_tests import OperatorTest, operator_tests
 from labcrane.cli.terminal import event_line
-from labcrane.core.clock import Tick
-from labcrane.core.records import Event, SessionState
+from labcrane.core import Event, SessionState
 from labcrane.design.plan import plan_session
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
-from labcrane.replay.replay import replay_session
+from labcrane.replay import replay_session
 from labcrane.session.commands import Command, Order
 from labcrane.session.resume import progress, remaining
 from labcrane.session.session import Visit, run

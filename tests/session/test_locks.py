@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from rehearsal import ScriptedConsole, a_study
 
-from labcrane.errors import RecordingError
+from labcrane import RecordingError
 from labcrane.files.lock import held
 from labcrane.session.session import Visit, record, run, running
 

@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from wrong_protocols import Entry, entries, lay_out, misspelt, right
 
 from labcrane import LabcraneError
-from labcrane.core.records import Event
+from labcrane.core import Event
 from labcrane.files.pseudonyms import pseudonyms
 from labcrane.protocol.questions import questions
 from labcrane.protocol.study import load

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from rehearsal import SHORT, Rehearsal, ScriptedConsole, a_study, rehearse
+from rehearsal import SHORT, Rehearsal, ScriptedConsole, a_study, rehearse, simulated_file
 
 from labcrane import open_recording
 from labcrane.cli.app import main
@@ -129,11 +129,7 @@ def test_ratings_after_each_trial_name_their_trial(tmp_path: Path) -> None:
 def test_answers_of_a_simulation_are_replayed(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
-    study = tmp_path / "study.yaml"
-    study.write_text(f"{HEAD}{RATINGS}", encoding="utf-8")
-    run = ["run", str(study), "--participant", "P001", "--simulate", "--fast"]
-    assert main([*run, "--data", str(tmp_path)]) == 0
-    file = tmp_path / "P001-SIMULATED" / "P001-SIMULATED.h5"
+    file = simulated_file(tmp_path, f"{HEAD}{RATINGS}")
     assert main(["replay", str(file), "--session", "1"]) == 0, capsys.readouterr().out
 
 

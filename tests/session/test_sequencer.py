@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from rehearsal import SHORT, a_study, rehearse
 
-from labcrane import InputDevice
-from labcrane.core.records import Frame, Phase
+from labcrane import Frame, InputDevice
+from labcrane.core import Phase
 from labcrane.protocol.protocol import OnFault
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study

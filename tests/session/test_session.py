@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from cranes import ENGINES
 from left_out import as_in_a_program
+from programs import ran
 from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
 from virtual_sticks import desk
 
@@ -165,12 +166,7 @@ sys.exit(main(json.loads(sys.argv[1])))
 
 
 def labcrane_process(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", PROGRAM, json.dumps(arguments)],
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-    )
+    return ran([sys.executable, "-c", PROGRAM, json.dumps(arguments)])
 
 
 @pytest.mark.slow

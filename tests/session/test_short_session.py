@@ -12,7 +12,7 @@ from pathlib import Path
 import pylsl
 import pytest
 import pyxdf
-from faults.sessions import kill_all, labcrane, unique, wait_for
+from faults.sessions import finished, kill_all, labcrane, unique, wait_for
 from simple_crane import FORM
 
 from labcrane import open_recording
@@ -105,9 +105,7 @@ def test_a_killed_session_is_resumed_and_all_that_others_have_seen_is_in_the_rec
     (broken,) = parts(journal)
     before = broken.read_bytes()
 
-    resumed = labcrane("resume", *words, "--no-page", cwd=tmp_path)
-    told, _ = resumed.communicate(timeout=240)
-    assert resumed.returncode == 0, told
+    finished(labcrane("resume", *words, "--no-page", cwd=tmp_path))
     assert broken.read_bytes() == before, "what was written before stays as it was"
     session = open_recording(tmp_path / "data" / "P001-SIMULATED" / "P001-SIMULATED.h5").session(1)
     trials = session.trials
@@ -122,8 +120,7 @@ def test_a_killed_session_is_resumed_and_all_that_others_have_seen_is_in_the_rec
     exported = labcrane(
         "export", "data", "--to", "xdf", "--include", "simulated", "--out", "out", cwd=tmp_path
     )
-    told, _ = exported.communicate(timeout=240)
-    assert exported.returncode == 0, told
+    finished(exported)
     (path,) = (tmp_path / "out").rglob("*.xdf")
     streams, _ = pyxdf.load_xdf(path, dejitter_timestamps=False, synchronize_clocks=False)
     (read,) = (one for one in streams if one["info"]["name"] == ["labcrane.state"])

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from rehearsal import DiesError, DiesInTrial, Rehearsal, StallingClock, a_study, rehearse
 
+from labcrane import Frame, open_recording
 from labcrane.core.clock import Clock
-from labcrane.core.records import Frame
 from labcrane.protocol.protocol import OnFault
 from labcrane.protocol.study import Study
-from labcrane.recording.participant_file.reader import open_recording
 from labcrane.replay import replay_session
 from labcrane.session import session as session_module
 from labcrane.session.commands import Command, Order, QueueConsole

@@ -11,8 +11,8 @@ from stoppable import Count, block, idle_rig, stoppable, with_steps
 
 from labcrane import Signal
 from labcrane.analysis.scoring.settings import COUNTS, TIME
+from labcrane.core import Event
 from labcrane.core.clock import ManualClock
-from labcrane.core.records import Event
 from labcrane.design.plan import plan_session
 from labcrane.protocol.protocol import OnFault
 from labcrane.protocol.steps import Step

@@ -21,9 +21,8 @@ from hypothesis.stateful import (
 )
 from stoppable import block, idle_rig, stoppable, with_steps
 
-from labcrane import ProtocolError
+from labcrane import DeviceError, ProtocolError
 from labcrane.design.plan import plan_session
-from labcrane.errors import DeviceError
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.steps import Step
 from labcrane.protocol.study import Study

@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from needs import needs
+from rehearsal import loaded
 
 import labcrane
 from labcrane.cli.app import main
 from labcrane.design.plan import plan_session
 from labcrane.protocol.questions import questions
-from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import discover
+from labcrane.protocol.study import Study
 
 FOLDER = Path(__file__).parents[2] / "protocols" / "crane_pilot"
 ITEMS = ("age", "gender", "experience", "handedness")
@@ -19,7 +19,7 @@ ITEMS = ("age", "gender", "experience", "handedness")
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    return load(FOLDER / "protocol.yaml", discover())
+    return loaded(FOLDER / "protocol.yaml")
 
 
 def test_nobody_is_given_feedback_and_no_window_tells_the_error(study: Study) -> None:
@@ -83,17 +83,23 @@ def test_a_folder_stands_for_its_protocol(
     )
 
 
+def simulated_pilot(folder: Path, participants: int) -> Path:
+    """Simulate some people of the study, without an engine and at 60 Hz; return their data."""
+    text = (FOLDER / "protocol.yaml").read_text().replace("rate_hz: 240", "rate_hz: 60")
+    text = text.replace("mujoco_crane, actuator: ideal", "kinematic_crane")
+    (folder / "protocol.yaml").write_text(text)
+    for name in ("instructions.md", "cohort.yaml"):
+        (folder / name).write_text((FOLDER / name).read_text())
+    words = ["simulate", str(folder), "--participants", str(participants)]
+    assert main([*words, "--out", str(folder / "data")]) == 0
+    return folder / "data"
+
+
 @pytest.mark.slow
 def test_a_simulated_participant_has_both_times_demographics_and_errors_that_nothing_cuts_off(
     tmp_path: Path,
 ) -> None:
-    text = (FOLDER / "protocol.yaml").read_text().replace("rate_hz: 240", "rate_hz: 60")
-    text = text.replace("mujoco_crane, actuator: ideal", "kinematic_crane")
-    (tmp_path / "protocol.yaml").write_text(text)
-    for name in ("instructions.md", "cohort.yaml"):
-        (tmp_path / name).write_text((FOLDER / name).read_text())
-    out = tmp_path / "data"
-    assert main(["simulate", str(tmp_path), "--participants", "1", "--out", str(out)]) == 0
+    out = simulated_pilot(tmp_path, 1)
     session = labcrane.open_recording(out / "P001-SIMULATED" / "P001-SIMULATED.h5").session(1)
     trials = session.trials
     assert len(trials) == 32

@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 from needs import needs
 
+from labcrane import FloatArray, open_recording
 from labcrane.files.pseudonyms import pseudonyms
-from labcrane.recording.participant_file.reader import Recording, SessionRecord, open_recording
+from labcrane.recording import Recording, SessionRecord
 from labcrane.simulation.simulation import SimulationJob, simulate_study
-from labcrane.types import FloatArray
 
 STUDY = Path(__file__).parents[2] / "protocols" / "crane_pilot"
 APART_M = 1e-4

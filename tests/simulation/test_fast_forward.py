@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 from needs import need
 
+from labcrane import open_recording
 from labcrane.machines.library import find_machine
-from labcrane.recording.participant_file.reader import open_recording
 from labcrane.simulation import fast_forward
 from labcrane.simulation.simulation import WAY, SimulationJob, simulate
 

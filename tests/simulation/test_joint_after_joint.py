@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 
 import labcrane
-from labcrane.analysis.cohort import find_cohort
-from labcrane.analysis.measures import measures_of
+from labcrane.analysis import find_cohort, measures_of
 from labcrane.cli.app import main
 
 FOLDER = Path(__file__).parents[2] / "protocols" / "crane_pilot"

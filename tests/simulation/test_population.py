@@ -5,16 +5,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from rehearsal import loaded
 from scipy.stats import truncnorm
 from simple_crane import CRANE
 
-from labcrane.analysis.cohort import find_cohort
-from labcrane.analysis.questionnaires import answers_of
+from labcrane import ProtocolError
+from labcrane.analysis import answers_of, find_cohort
 from labcrane.cli.app import main
 from labcrane.design.plan import plan_session
-from labcrane.errors import ProtocolError
-from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import discover
+from labcrane.protocol.study import Study
 from labcrane.simulation.population import Lognormal, Population, read_population
 
 COUNT = 2000
@@ -41,7 +40,7 @@ sessions:
 def study(tmp_path: Path) -> Study:
     path = tmp_path / "protocol.yaml"
     path.write_text(STUDY)
-    return load(path, discover())
+    return loaded(path)
 
 
 def names() -> list[str]:
@@ -218,7 +217,7 @@ PERSON = "questionnaires: {person: {use: demographics, ask: [age, gender, handed
 def asking(tmp_path: Path) -> Study:
     path = tmp_path / "asking.yaml"
     path.write_text(STUDY.replace("design:\n", PERSON + "design:\n"))
-    return load(path, discover())
+    return loaded(path)
 
 
 def test_answers_are_drawn_from_the_distributions_that_are_written(asking: Study) -> None:
@@ -281,7 +280,7 @@ def test_answers_that_nobody_could_give_are_refused_with_what_there_is(
 
 def test_the_simulated_people_of_the_crane_study_are_those_of_the_paper() -> None:
     """Who answers is in the recordings: 18 to 35 years old, and both genders, others none."""
-    study = load(CRANE_PILOT / "protocol.yaml", discover())
+    study = loaded(CRANE_PILOT / "protocol.yaml")
     population = read_population(CRANE_PILOT / "cohort.yaml", study)
     said = [population.study_of(study, name).answers["person"] for name in names()[:36]]
     assert all(18.0 <= one["age"] <= 35.0 for one in said)

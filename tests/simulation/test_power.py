@@ -12,9 +12,9 @@ from scipy.stats import binom, nct, norm, t
 from statsmodels.stats.power import TTestIndPower, TTestPower
 from statsmodels.stats.proportion import proportion_confint
 
+from labcrane import ProtocolError
 from labcrane.analysis.report.figures import power_curve
 from labcrane.cli.app import main
-from labcrane.errors import ProtocolError
 from labcrane.simulation.power import Claim, Effect, Pool, make_pool, power, read_effect
 from labcrane.simulation.sample_size import paragraph, sample_size
 from labcrane.simulation.share import share_of

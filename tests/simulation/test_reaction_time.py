@@ -6,12 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.stats import f_oneway
+from simulation.test_crane_pilot import simulated_pilot
 
-from labcrane.analysis.cohort import find_cohort
-from labcrane.analysis.movements import movements_of
-from labcrane.cli.app import main
-
-FOLDER = Path(__file__).parents[2] / "protocols" / "crane_pilot"
+from labcrane.analysis import find_cohort, movements_of
 
 
 def p_over_distance(table: pd.DataFrame, measure: str) -> float:
@@ -26,13 +23,7 @@ def test_reaction_time_of_an_operator_without_an_effect_does_not_go_with_distanc
     tmp_path: Path,
 ) -> None:
     """A share of the peak speed, by which it once was measured, finds one in the same movements."""
-    text = (FOLDER / "protocol.yaml").read_text().replace("rate_hz: 240", "rate_hz: 60")
-    text = text.replace("mujoco_crane, actuator: ideal", "kinematic_crane")
-    (tmp_path / "protocol.yaml").write_text(text)
-    for name in ("instructions.md", "cohort.yaml"):
-        (tmp_path / name).write_text((FOLDER / name).read_text())
-    out = tmp_path / "data"
-    assert main(["simulate", str(tmp_path), "--participants", "4", "--out", str(out)]) == 0
+    out = simulated_pilot(tmp_path, 4)
     rows = [
         {
             "who": person.name,

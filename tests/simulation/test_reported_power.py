@@ -13,10 +13,9 @@ from statsmodels.formula.api import ols
 from statsmodels.stats.multitest import multipletests
 from statsmodels.stats.power import TTestIndPower
 
-from labcrane.analysis.cohort import find_cohort
-from labcrane.analysis.measures import measures_of
+from labcrane import ProtocolError
+from labcrane.analysis import find_cohort, measures_of
 from labcrane.cli.app import main
-from labcrane.errors import ProtocolError
 from labcrane.simulation.power import Claim, read_effect
 from labcrane.simulation.reported import (
     Drawer,

@@ -16,9 +16,8 @@ import pytest
 from dying_work import die_once
 from simple_crane import CRANE
 
+from labcrane import LabcraneError, ProtocolError, RecordingError, open_recording
 from labcrane.cli.app import main
-from labcrane.errors import LabcraneError, ProtocolError, RecordingError
-from labcrane.recording.participant_file.reader import open_recording
 from labcrane.simulation.simulation import SimulationJob, simulate, simulate_study
 
 STUDY = (

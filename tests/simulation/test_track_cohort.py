@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from labcrane.core.records import PlannedTrial
+from labcrane.core import PlannedTrial
 from labcrane.design.tracks import PlannedTrack, plan_rounds
 from labcrane.design.up_down import settles_at
 from labcrane.protocol.tracks import QuestPlus, Track, UpDown

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from labcrane.errors import ProtocolError
+from labcrane import ProtocolError
 from labcrane.start import document
 from labcrane.start.document import ApprovedError, Document, NewerFileError
 

@@ -11,8 +11,8 @@ import pytest
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
+from labcrane import ProtocolError
 from labcrane.cli.shipped import shipped_studies
-from labcrane.errors import ProtocolError
 from labcrane.start.text import edited, positions, ties
 
 SHIPPED = [each / "protocol.yaml" for each in shipped_studies().values()]

@@ -15,12 +15,12 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from rehearsal import loaded
 
+from labcrane import ProtocolError
 from labcrane.cli.offered import OFFERED, offered
 from labcrane.cli.shipped import new_study
-from labcrane.errors import ProtocolError, StorageError
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
+from labcrane.errors import StorageError
 from labcrane.start.jobs import Option
 from labcrane.start.service import Workspace
 
@@ -230,11 +230,11 @@ def test_the_text_is_checked_as_it_is_typed_and_the_finding_has_its_place(
 @pytest.mark.slow
 def test_a_saved_study_is_the_same_study_but_for_its_field(workspace: Workspace) -> None:
     path = workspace.root / "mine" / "protocol.yaml"
-    before = load(path, discover()).protocol.model_dump()
+    before = loaded(path).protocol.model_dump()
     workspace.open("mine/protocol.yaml")
     workspace.edit(0, "set", ["participants", "planned"], 48)
     workspace.save(1)
-    after = load(path, discover()).protocol.model_dump()
+    after = loaded(path).protocol.model_dump()
     assert after == before | {"participants": before["participants"] | {"planned": 48}}
 
 

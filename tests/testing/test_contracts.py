@@ -11,18 +11,15 @@ import pytest
 
 import labcrane.testing
 from labcrane import Cue, Frame, Run, Settings, Signal, offer
-from labcrane.core import Sphere
-from labcrane.core.findings import Finding, Verdict
-from labcrane.core.primitives import Shape
-from labcrane.core.signals import SignalChannel, SignalFault, SignalStream
+from labcrane.core import Finding, Shape, SignalChannel, SignalFault, SignalStream, Sphere, Verdict
 from labcrane.testing import (
     CueContract,
     ExaminationContract,
     ExporterContract,
     PluginContract,
     SignalMonitorContract,
+    check_signals,
 )
-from labcrane.testing.roles import check_signals
 
 
 class Trail(Cue):
