@@ -42,11 +42,6 @@ def test_variable_error_is_the_residual_of_a_model_of_all_conditions(seed: int) 
         assert found.loc[person, "variable_error_m"] < 0.7 * np.std(own["constant_error"])
 
 
-def test_variable_error_is_the_spread_within_conditions_that_was_drawn() -> None:
-    found = pd.concat([errors(drawn(seed)) for seed in range(40)])
-    assert found["variable_error_m"].mean() == pytest.approx(0.036, abs=0.002)
-
-
 def test_absolute_error_is_along_the_axis_and_radial_error_in_any_direction() -> None:
     table = pd.DataFrame(
         {

@@ -74,12 +74,6 @@ def test_smoothness_does_not_depend_on_the_unit_of_speed(factor: float) -> None:
     assert ldlj(factor * bell, RATE_HZ) == pytest.approx(ldlj(bell, RATE_HZ), rel=1e-12)
 
 
-def test_tremor_makes_a_movement_less_smooth() -> None:
-    shaken = BELL * (1.0 + 0.2 * np.sin(2 * np.pi * 6.0 * TIME))
-    assert sparc(shaken, RATE_HZ) < sparc(BELL, RATE_HZ)
-    assert ldlj(along_x(shaken), RATE_HZ) < ldlj(along_x(BELL), RATE_HZ)
-
-
 @pytest.mark.parametrize("count", [1, 2, 4])
 def test_sub_movements_are_the_bells_a_movement_is_made_of(count: int) -> None:
     speed = np.concatenate([BELL / (at + 1) for at in range(count)])
