@@ -1,5 +1,6 @@
 """Quality of loop and clocks, one row per session and per stream."""
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -74,6 +75,37 @@ def _clocks(session: SessionRecord) -> Iterator[dict[str, Any]]:
             corrected = "yes" if about.pop("corrected") else "no"
             samples = len(stream.time)
             yield {"stream": name, "corrected": corrected, "samples": samples, **about}
+
+
+def estimates_quality(participant: Participant) -> "pd.DataFrame":
+    """Return how late the values of estimates were used, one row per session and estimate.
+
+    Latency is the time from what a value stands for to the wake-up of the first tick that used it.
+    ``fallback_share`` is the part of the ticks that used the fallback.
+    """
+    import pandas as pd
+
+    return pd.DataFrame(participant.rows(_estimates))
+
+
+def _estimates(session: SessionRecord) -> Iterator[dict[str, Any]]:
+    frames = session.streams["input"]
+    states = [name for name in frames.units if re.fullmatch(r"estimate\.\w+\.state", name)]
+    for column in states:
+        own = column.removesuffix(".state")
+        found = frames.columns((f"{own}.time", column))
+        time, used = found[f"{own}.time"], found[column] == 0.0
+        first = used & (np.diff(time, prepend=np.nan) != 0.0)
+        woke = session.streams["loop"].columns(("woke",))["woke"]
+        latency_ms = 1e3 * (woke - time)[first]
+        middle, most = np.quantile(latency_ms, [0.5, 0.99]) if first.any() else (np.nan, np.nan)
+        yield {
+            "estimate": own.removeprefix("estimate."),
+            "values_used": int(first.sum()),
+            "latency_median_ms": float(middle),
+            "latency_p99_ms": float(most),
+            "fallback_share": float(1.0 - used.mean()),
+        }
 
 
 def loop_backs(participant: Participant) -> "pd.DataFrame":

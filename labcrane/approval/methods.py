@@ -58,6 +58,11 @@ def _assistant(protocol: Mapping[str, Any]) -> list[str]:
         return []
     share = assist["share"]
     words = "a share" if isinstance(share, Mapping) else f"a share of {_value(share)}"
+    if _follows(share):
+        (first, last), (low, high) = share["between"], share["to"]
+        words = f"a share that followed the estimate {share['estimate']}, {_value(low)} at "
+        words += f"{_value(first)} and {_value(high)} at {_value(last)}, and changed by at most "
+        words += f"{_value(share['at_most_per_s'])} per second,"
     said = f"An assistant ({_use(assist)}) moved the machine together with them: the command of "
     said += f"each joint was a weighted mean of both, with {words} of the assistant"
     if takeover := assist.get("takeover"):
@@ -172,7 +177,12 @@ def _given(given: str | list[str], protocol: Mapping[str, Any]) -> str:
 def _shares(protocol: Mapping[str, Any]) -> Mapping[str, float]:
     """Return the shares of an assistant that have names."""
     share = protocol.get("assist", {}).get("share")
-    return share if isinstance(share, Mapping) else {}
+    return share if isinstance(share, Mapping) and not _follows(share) else {}
+
+
+def _follows(share: object) -> bool:
+    """Whether a share follows an estimate."""
+    return isinstance(share, Mapping) and isinstance(share.get("estimate"), str)
 
 
 def _sessions(protocol: Mapping[str, Any]) -> list[str]:

@@ -26,7 +26,14 @@ from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
 from labcrane.protocol.components import ComponentResolver, ComponentSpec
 from labcrane.protocol.design import CONDITION, Switch
-from labcrane.protocol.protocol import ASSIST, DEFAULT_OPERATOR, OF_ASSIST, Protocol, read
+from labcrane.protocol.protocol import (
+    ASSIST,
+    DEFAULT_OPERATOR,
+    OF_ASSIST,
+    Protocol,
+    ShareByEstimate,
+    read,
+)
 from labcrane.protocol.references import Parts, ReferenceChecker, twice
 from labcrane.protocol.steps import Block
 from labcrane.protocol.tracks import Track
@@ -566,7 +573,7 @@ def _estimates(choices: Mapping[str, ComponentSpec]) -> dict[str, EstimateSettin
 def _check_estimates(
     source: YamlFile, protocol: Protocol, estimates: Mapping[str, EstimateSettings]
 ) -> None:
-    """Note estimates whose names cannot be columns, and those without a stream."""
+    """Note estimates whose names cannot be columns, that have no stream, or are not there."""
     single = [label for label, each in protocol.streams.items() if not each.several]
     for name, settings in estimates.items():
         if not name.isidentifier():
@@ -576,6 +583,12 @@ def _check_estimates(
             there = nearest(settings.stream, single, "streams has")
             message = f"there is no single stream {settings.stream!r} under streams; {there}"
             source.problem(("estimates", name, "stream"), message)
+    share = protocol.assist.share if protocol.assist else None
+    known = [f"{name}.{value}" for name, each in estimates.items() for value in each.values]
+    if isinstance(share, ShareByEstimate) and share.estimate not in known:
+        there = nearest(share.estimate, known, "estimates gives")
+        message = f"there is no estimate {share.estimate!r}; {there}"
+        source.problem((ASSIST, "share", "estimate"), message)
 
 
 def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:

@@ -68,6 +68,9 @@ streams:
   brain: {type: EEG, source_id: cap-7, required: false}
 monitors:
   brain: {use: eeg_signal}
+assist:
+  use: toward_target
+  share: {estimate: load.ratio, between: [1, 2], to: [0, 1], at_most_per_s: 0.1}
 estimates:
   load:
     use: band_power

@@ -36,6 +36,8 @@ ANY: dict[str, str] = {
     "Step.seconds": "is asked about by the questions about breaks",
     "LoadedCraneSettings.payload_kg": ITS_DOUBTS,
     "Assist.share": SHARE,
+    "ShareByEstimate.to": SHARE,
+    "ShareByEstimate.between": OWN_UNIT,
     "QuestPlus.guess": SHARE,
     "OperatorSettings.lapse_rate": SHARE,
     "ErrorSettings.over_grip": SHARE,

@@ -13,6 +13,7 @@ from labcrane.analysis.gaze_streams import unmeasured_of
 from labcrane.analysis.measures import DEFAULTS, measures_of
 from labcrane.analysis.parallel import work
 from labcrane.analysis.quality import (
+    estimates_quality,
     exclusions,
     is_result,
     loop_backs,
@@ -148,6 +149,7 @@ def write_report(
 TABLES: Mapping[str, Callable[[Participant], "pd.DataFrame"]] = {
     "loop": loop_quality,
     "sync": sync_quality,
+    "estimates": estimates_quality,
     "loop_backs": loop_backs,
     "answers": answers_of,
     "scores": scores_of,
@@ -565,6 +567,13 @@ def _syncs(page: Page, tables: Tables) -> None:
         page.say("No external streams were recorded: there is one clock.")
     else:
         page.table("sync_quality", tables["sync"])
+    page.rows(
+        "estimates",
+        tables["estimates"],
+        "How long after the time that a value stands for the first tick used it, and the part of "
+        "the ticks that used the fallback.",
+        "Estimates",
+    )
     page.rows(
         "loop_back",
         tables["loop_backs"],

@@ -1,0 +1,159 @@
+"""Estimates in whole sessions: their columns, their states, and a share that follows one."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rehearsal import ScriptedConsole, a_study
+from simple_crane import CRANE
+
+from labcrane import ProtocolError, open_recording
+from labcrane.analysis.cohort import Participant, Status
+from labcrane.analysis.quality import estimates_quality
+from labcrane.protocol import estimated, rig
+from labcrane.protocol.estimated import WORDS, State, WithEstimates
+from labcrane.protocol.questions import questions
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+from labcrane.replay.replay import replay_session
+from labcrane.session.session import run
+from labcrane.session.visit import Visit
+from labcrane.types import FloatArray
+
+SHARE = "{estimate: load.ratio, between: [1, 3], to: [0, 0.8], at_most_per_s: 0.5}"
+STUDY = (
+    """\
+labcrane: 1
+study: adaptive
+title: A share that follows an estimate
+rate_hz: 60
+"""
+    + CRANE
+    + """\
+assist: {use: toward_target, share: SHARE}
+streams:
+  eeg: {name: Amplifier}
+estimates:
+  load: {use: band_power, stream: eeg, channels: [Fz], per_channels: [Pz], fallback: {ratio: 2}}
+tasks:
+  aiming: {use: aiming, distances: [1, 2], movements: 2, limit_s: 20}
+sessions:
+  - {name: only, steps: [{block: {task: aiming, pairs: 1}}]}
+"""
+)
+
+
+def text(share: str = SHARE) -> str:
+    return STUDY.replace("SHARE", share)
+
+
+class Scripted:
+    """Gives a ratio of 3 and, a second in four, each of the states without a value."""
+
+    def __init__(self, *_: object) -> None:
+        self._states = (State.OK, State.LATE, State.OK, State.NOT_A_NUMBER)
+
+    def fill(self, out: FloatArray, now: float) -> None:
+        state = self._states[int(now) % len(self._states)]
+        if state is State.OK:
+            out[0] = 3.0
+        out[-2:] = now - 0.1, state
+
+    def close(self) -> None:
+        pass
+
+
+def recorded(folder: Path, written: str) -> Path:
+    folder.mkdir(exist_ok=True)
+    visit = Visit(a_study(folder, written), "P001", 1, folder / "data", simulated=True, fast=True)
+    return run(visit, ScriptedConsole())
+
+
+@pytest.fixture
+def scripted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(estimated, "Received", Scripted)
+    monkeypatch.setattr(rig, "WithEstimates", lambda *given: WithEstimates(*given[:2], "any"))
+
+
+def test_the_example_has_no_warning() -> None:
+    path = Path(__file__).parents[2] / "examples" / "adaptive_assist" / "protocol.yaml"
+    assert list(questions(load(path, discover()))) == []
+
+
+def test_without_streams_each_tick_has_the_fallback_and_says_so(tmp_path: Path) -> None:
+    frames = open_recording(recorded(tmp_path, text())).session(1).streams["input"].data
+    assert set(frames["estimate.load.ratio"]) == {2.0}
+    assert set(frames["estimate.load.state"]) == {float(State.NO_DATA)}
+    assert frames["estimate.load.time"].isna().all()
+
+
+def test_each_change_of_state_is_an_event_and_the_fallback_is_in_the_same_tick(
+    tmp_path: Path, scripted: None
+) -> None:
+    session = open_recording(recorded(tmp_path, text())).session(1)
+    frames = session.streams["input"].data
+    state = frames["estimate.load.state"].to_numpy()
+    assert np.array_equal(frames["estimate.load.ratio"], np.where(state == 0.0, 3.0, 2.0))
+    changes = np.flatnonzero(np.diff(state)) + 1
+    events = session.events[session.events["name"].str.startswith("estimate.")]
+    assert set(changes) <= set(events["tick"]) <= {0, *changes}
+    whys = {data.get("why") for data in events["data"]}
+    assert whys == {None, WORDS[State.LATE], WORDS[State.NOT_A_NUMBER]}
+
+
+def test_the_share_goes_to_where_the_value_maps_and_never_faster_than_its_limit(
+    tmp_path: Path, scripted: None
+) -> None:
+    session = open_recording(recorded(tmp_path, text())).session(1)
+    loop, frames = session.streams["loop"].data, session.streams["input"].data
+    moving = ((loop["trial"] > 0) & (loop["paused"] == 0.0)).to_numpy()
+    share = session.streams["command"].data["assist.share"].to_numpy()[moving]
+    aim = np.where(frames["estimate.load.ratio"].to_numpy()[moving] == 3.0, 0.8, 0.4)
+    expected, now = [], 0.0
+    for each in aim:
+        now += math.copysign(min(abs(each - now), 0.5 / 60), each - now)
+        expected.append(now)
+    assert share == pytest.approx(expected, abs=1e-12)
+    assert share.max() == pytest.approx(0.8)
+
+
+def test_the_latency_of_each_value_that_was_used_is_in_the_report(
+    tmp_path: Path, scripted: None
+) -> None:
+    path = recorded(tmp_path, text())
+    (row,) = estimates_quality(Participant("P001", path, Status.SIMULATED, "")).to_dict("records")
+    state = open_recording(path).session(1).streams["input"].data["estimate.load.state"]
+    assert row["values_used"] == (state == 0.0).sum()
+    assert row["latency_median_ms"] == pytest.approx(100.0)
+    assert row["latency_p99_ms"] == pytest.approx(100.0)
+    assert row["fallback_share"] == pytest.approx((state != 0.0).mean())
+
+
+def test_a_replay_reads_the_columns_and_gives_the_same_bits(tmp_path: Path, scripted: None) -> None:
+    path = recorded(tmp_path, text())
+    replayed = replay_session(path, 1)
+    assert (replayed.difference, replayed.parts) == (None, ())
+    other = tmp_path / "other.yaml"
+    other.write_text(text(SHARE.replace("0.5", "0.4")))
+    again = replay_session(path, 1, protocol=other)
+    assert again.parts == ("assist.share.at_most_per_s: recorded 0.5, now 0.4",)
+    assert again.difference is not None
+
+
+REFUSED = {
+    "there is no estimate 'load.ration'; did you mean 'load.ratio'": text(
+        SHARE.replace("ratio", "ration")
+    ),
+    "between has 3 twice": text(SHARE.replace("[1, 3]", "[3, 3]")),
+    "less than or equal to 1": text(SHARE.replace("0.8", "1.8")),
+    "there is no single stream 'eg' under streams": text().replace("stream: eeg", "stream: eg"),
+    "fallback has rate, and the values are ratio": text().replace("{ratio: 2}", "{rate: 2}"),
+    "'my load' names columns": text("1").replace("  load:", "  my load:"),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_cannot_be_estimated_is_refused(message: str, tmp_path: Path) -> None:
+    with pytest.raises(ProtocolError, match=message):
+        a_study(tmp_path, REFUSED[message])
