@@ -1,6 +1,6 @@
 """A task with secondary tasks beside it, which is one task to the loop, the plan and the record."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,10 +23,14 @@ class Beside(Task):
         The task.
     secondary
         What runs beside it, by the protocol's names.
+    always
+        Names of those that are on in every trial.
     """
 
-    def __init__(self, task: Task, secondary: Mapping[str, SecondaryTask]) -> None:
-        self._task, self._secondary = task, secondary
+    def __init__(
+        self, task: Task, secondary: Mapping[str, SecondaryTask], always: Container[str] = ()
+    ) -> None:
+        self._task, self._secondary, self._always = task, secondary, always
         self.signals = (
             *task.signals,
             *(
@@ -64,7 +68,9 @@ class Beside(Task):
     def begin_trial(self, trial: Trial) -> None:
         self._task.begin_trial(trial)
         self._active = {
-            name: each for name, each in self._secondary.items() if name in trial.active
+            name: each
+            for name, each in self._secondary.items()
+            if name in trial.active or name in self._always
         }
         for each in self._active.values():
             each.begin_trial(trial)

@@ -12,8 +12,8 @@ from enum import IntEnum
 import numpy as np
 
 from labcrane.core.clock import Tick
-from labcrane.core.records import Frame, Run, Trial, Value
-from labcrane.core.roles import InputDevice
+from labcrane.core.records import Frame, Phase, Run, Trial, TrialStatus, Value
+from labcrane.core.roles import InputDevice, SecondaryTask
 from labcrane.core.settings import EstimateSettings
 from labcrane.core.signals import Layout, Signal
 from labcrane.types import FloatArray
@@ -53,6 +53,47 @@ def estimate_signals(name: str, settings: EstimateSettings) -> tuple[Signal, ...
     own = OF_ESTIMATE + name
     values = (Signal(f"{own}.{value}", "") for value in settings.values)
     return (*values, Signal(f"{own}.time", "s"), Signal(f"{own}.state", "1"))
+
+
+class TrialMeans(SecondaryTask):
+    """The mean of each value of an estimate over a trial, of the ticks that had a value.
+
+    It runs beside every task, so that its results are columns of the trial table, and a track can
+    choose by them.
+    """
+
+    def __init__(self, name: str, settings: EstimateSettings) -> None:
+        self._own, self._values = OF_ESTIMATE + name, settings.values
+        self.results = tuple(
+            Signal(value, "", definition=f"mean of the estimate {name}.{value} over the trial")
+            for value in settings.values
+        )
+        self._sum, self._ticks = np.zeros(len(settings.values)), 0
+
+    def open(self, run: Run) -> None:
+        self._places = [run.axes.index(f"{self._own}.{value}") for value in self._values]
+        self._state = run.axes.index(f"{self._own}.state")
+
+    def begin_trial(self, trial: Trial) -> None:
+        self._sum[:], self._ticks = 0.0, 0
+
+    def evaluate(self, frame: Frame) -> TrialStatus:
+        if frame.axes[self._state] == State.OK:
+            self._sum += frame.axes[self._places]
+            self._ticks += 1
+        return TrialStatus(Phase.RUNNING, np.empty(0))
+
+    def measure(self) -> Mapping[str, Value]:
+        means = self._sum / self._ticks if self._ticks else [None] * len(self._values)
+        return {
+            name: mean if mean is None else float(mean)
+            for name, mean in zip(self._values, means, strict=True)
+        }
+
+
+def trial_means(estimates: Mapping[str, EstimateSettings]) -> dict[str, SecondaryTask]:
+    """Return what measures estimates by trial, by the protocol's names."""
+    return {name: TrialMeans(name, each) for name, each in estimates.items()}
 
 
 class Received:

@@ -2,7 +2,7 @@
 
 import hashlib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeGuard
@@ -571,13 +571,19 @@ def _estimates(choices: Mapping[str, ComponentSpec]) -> dict[str, EstimateSettin
 
 
 def _check_estimates(
-    source: YamlFile, protocol: Protocol, estimates: Mapping[str, EstimateSettings]
+    source: YamlFile,
+    protocol: Protocol,
+    estimates: Mapping[str, EstimateSettings],
+    taken: Container[str],
 ) -> None:
-    """Note estimates whose names cannot be columns, that have no stream, or are not there."""
+    """Note estimates with a name that is taken or wrong, without a stream, or that are missing."""
     single = [label for label, each in protocol.streams.items() if not each.several]
     for name, settings in estimates.items():
         if not name.isidentifier():
             message = f"{name!r} names columns; give a word of letters, digits and underscores"
+            source.problem(("estimates", name), message, key=True)
+        if name in taken:
+            message = f"{name!r} is already the name of a secondary task"
             source.problem(("estimates", name), message, key=True)
         if settings.stream not in single:
             there = nearest(settings.stream, single, "streams has")
@@ -589,6 +595,24 @@ def _check_estimates(
         there = nearest(share.estimate, known, "estimates gives")
         message = f"there is no estimate {share.estimate!r}; {there}"
         source.problem((ASSIST, "share", "estimate"), message)
+
+
+def _with_beside(
+    chooser: ComponentResolver,
+    tasks: Mapping[str, Task],
+    secondary: Mapping[str, ComponentSpec],
+    estimates: Mapping[str, EstimateSettings],
+    machine: Machine,
+) -> dict[str, Task]:
+    """Return the tasks with what runs beside them; each has its own, which is opened once."""
+    from labcrane.protocol.beside import Beside  # noqa: PLC0415 - it loads numpy
+    from labcrane.protocol.estimated import trial_means  # noqa: PLC0415
+
+    built = {name: chooser.build(SecondaryTask, "secondary", secondary, machine) for name in tasks}
+    return {
+        name: Beside(task, built[name] | trial_means(estimates), estimates)
+        for name, task in tasks.items()
+    }
 
 
 def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
@@ -626,14 +650,10 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     for name in shares.keys() & {*cues, *sounds, *views, *secondary}:
         message = f"{name!r} is already the name of a feedback or a secondary task"
         source.problem((ASSIST, "share", name), message, key=True)
-    if secondary and machine:
-        from labcrane.protocol.beside import Beside  # noqa: PLC0415 - it loads numpy
-
-        # Each task has its own: a component is opened once.
-        built = {
-            name: chooser.build(SecondaryTask, "secondary", secondary, machine[0]) for name in tasks
-        }
-        tasks = {name: Beside(task, built[name]) for name, task in tasks.items()}
+    others = chooser.choose_others()
+    estimates = _estimates(others)
+    if (secondary or estimates) and machine:
+        tasks = _with_beside(chooser, tasks, secondary, estimates, machine[0])
     asked = chooser.choose_questionnaires(protocol) if protocol else {}
     questionnaires = (
         chooser.build(Questionnaire, "questionnaires", asked, machine[0]) if machine else {}
@@ -643,9 +663,9 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     recordings = chooser.choose_several(Capture, "recordings")
     for name in recordings.keys() & (protocol.streams if protocol else {}):
         source.problem(("recordings", name), f"{name!r} is already the name of a stream", key=True)
-    monitors, others = chooser.choose_monitors(), chooser.choose_others()
+    monitors = chooser.choose_monitors()
     if protocol is not None:
-        _check_estimates(source, protocol, _estimates(others))
+        _check_estimates(source, protocol, estimates, secondary)
     named: dict[str, Mapping[str, ComponentSpec]] = {
         "tasks": choices,
         "secondary": secondary,

@@ -118,6 +118,24 @@ def test_the_share_goes_to_where_the_value_maps_and_never_faster_than_its_limit(
     assert share.max() == pytest.approx(0.8)
 
 
+def test_a_track_chooses_by_the_mean_over_the_trial(tmp_path: Path, scripted: None) -> None:
+    design = (
+        "design: {tracks: {help: {factor: assist, levels: {full: 1, half: 2}, "
+        "measure: load_ratio, at_most: 2.5, up_down: {reversals: 2, leave_out: 0}, "
+        "rounds: 2}}}\nsessions:"
+    )
+    written = text("{half: 0.5, full: 1}").replace("sessions:", design)
+    written = written.replace("pairs: 1}", "track: help, feedback: none}")
+    session = open_recording(recorded(tmp_path, written)).session(1)
+    loop, frames = session.streams["loop"].data, session.streams["input"].data
+    for row in session.trials.itertuples():
+        used = (loop["trial"] == row.trial) & (frames["estimate.load.state"] == 0.0)
+        assert row.load_ratio == pytest.approx(frames["estimate.load.ratio"][used].mean())
+    judged = session.trials["track_success"].dropna()
+    assert set(judged) == {0.0}, "a mean of 3 is above 2.5 in each"
+    assert set(session.trials["assist"]) == {"full"}
+
+
 def test_the_latency_of_each_value_that_was_used_is_in_the_report(
     tmp_path: Path, scripted: None
 ) -> None:
