@@ -98,7 +98,7 @@ class OpenFault:
 
 ROUTINE = (
     "trial.", "order.", "questionnaire.", "step.", "block.", "pause.", "session.", "signal.",
-    "scene.", "consent.", "stop_rule.",
+    "scene.", "consent.", "stop_rule.", "estimate.",
 )  # fmt: skip
 """Prefixes of the events that are not counted in a trial."""
 
