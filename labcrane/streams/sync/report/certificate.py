@@ -9,13 +9,9 @@ from enum import StrEnum
 import numpy as np
 
 from labcrane.streams.sync.quality import Quality
+from labcrane.streams.sync.report.limits import GAP_S, LAG_S, PROBE_AGE_S, RATE, SILENT_S
 from labcrane.streams.sync.terms import in_words
 
-LONG_S = 1.0
-SILENT_S = 5.0
-RATE_OFF = 2e-3
-LATE_S = 0.05
-UNPROBED_S = 30.0
 CONGESTED_S = 10.0
 
 
@@ -50,9 +46,9 @@ class Fault(StrEnum):
 
 
 _FAULTS: dict[Fault, Callable[[Quality, float], bool]] = {
-    Fault.INTERRUPTED: lambda q, _: q.longest_gap_s > LONG_S,
+    Fault.INTERRUPTED: lambda q, _: q.longest_gap_s > GAP_S.fail,
     Fault.WRONG_RATE: lambda q, hz: (
-        np.isnan(q.first_rate_hz) and abs(q.rate_hz / hz - 1.0) > RATE_OFF
+        np.isnan(q.first_rate_hz) and abs(q.rate_hz / hz - 1.0) > RATE.warn
     ),
     Fault.CHANGED_RATE: lambda q, _: bool(np.isfinite(q.first_rate_hz)),
     Fault.LATE_STAMPS: lambda q, _: q.late_stamps > 0,
@@ -69,7 +65,7 @@ _ANY_STREAMS_FAULTS: dict[Fault, Callable[[Quality], bool]] = {
     Fault.DISORDERED: lambda q: q.disordered > 0,
     Fault.STALLED: lambda q: q.stalls > 0,
     Fault.COARSE: lambda q: q.grid_s > 0.0,
-    Fault.DIED: lambda q: q.silent_s > SILENT_S,
+    Fault.DIED: lambda q: q.silent_s > SILENT_S.warn,
     Fault.STEPPED: lambda q: q.steps > 0,
     Fault.RESTARTED: lambda q: q.restarts > 0,
     Fault.SLEPT: lambda q: q.sleeps > 0,
@@ -79,8 +75,8 @@ _ANY_STREAMS_FAULTS: dict[Fault, Callable[[Quality], bool]] = {
     Fault.RECEIVER: lambda q: q.whose == "receiver",
     Fault.FOREIGN: lambda q: q.whose == "foreign",
     Fault.AHEAD: lambda q: q.ahead_s > 0.0,
-    Fault.SLOW: lambda q: not q.whose and q.lag_s > LATE_S,
-    Fault.PROBES_MISSING: lambda q: q.probe_age_s > UNPROBED_S,
+    Fault.SLOW: lambda q: not q.whose and q.lag_s > LAG_S.warn,
+    Fault.PROBES_MISSING: lambda q: q.probe_age_s > PROBE_AGE_S.fail,
 }
 
 
