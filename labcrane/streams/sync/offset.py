@@ -16,6 +16,9 @@ SURE = 1.96
 SLEW = 1e-4
 """A lasting change of rate beyond this, in seconds per second, no crystal does by itself."""
 
+AROUND = 5
+ONE_WAY = 0.15
+
 CONGESTED_S = 1e-3
 LONG = 5
 
@@ -63,9 +66,15 @@ class OffsetCurve:
     def with_error(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the offset, and how far it may be off at 95 %, in seconds, shape ``(n,)`` each."""
         offset, deviation = self._at(times)
+        # Where every exchange was long, what is known of the ways rests on a model of them.
+        around = np.minimum.reduceat(
+            np.pad(self.excess, AROUND, mode="edge"),
+            np.column_stack([k := np.arange(len(self.probes)), k + 2 * AROUND]).ravel(),
+        )[::2]
+        held_up = ONE_WAY * np.interp(times, self.probes[:, REMOTE], around)
         stray = np.interp(times, self.probes[:, REMOTE], self._outside())
         hidden = self.least_rtt / 2.0 + _own_unit(self.probes[:, RTT])
-        return offset, SURE * deviation + hidden + stray
+        return offset, SURE * deviation + hidden + held_up + stray
 
     def _outside(self) -> FloatArray:
         """Return by how much the curve is where no ways of its probes could lie, shape ``(n,)``."""
