@@ -137,7 +137,8 @@ def find(
         chosen = always
     else:
         odd = np.maximum(LONGER * usual, SURE * scatter)
-        usual = usual if exact else _by_spans(steps)
+        away = steps - usual
+        usual = _flowing(steps, usual, np.abs(away) <= odd) if exact else _by_spans(steps)
         away = steps - usual
         chosen = away > odd
         if not exact:
@@ -185,6 +186,17 @@ def _by_spans(steps: FloatArray) -> FloatArray:
     span = min(5 * LEVEL, len(steps))
     sums = np.r_[0.0, np.cumsum(steps)]
     return np.full(len(steps), float(np.median(sums[span:] - sums[:-span])) / span)
+
+
+def _flowing(steps: FloatArray, usual: FloatArray, even: npt.NDArray[np.bool_]) -> FloatArray:
+    """Return the mean of usual steps around each, which scatter hardly blurs."""
+    blocks = np.array_split(np.arange(len(steps)), max(len(steps) // MANY, 1))
+    kept = [block[even[block]] for block in blocks]
+    kept = [block for block in kept if len(block) > MANY // 2]
+    if not kept:
+        return usual
+    middle = [float(block.mean()) for block in kept]
+    return np.interp(np.arange(len(steps)), middle, [float(steps[block].mean()) for block in kept])
 
 
 def _alone(odd: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
