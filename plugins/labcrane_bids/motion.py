@@ -16,6 +16,9 @@ AXES = ("x", "y", "z")
 TYPES = {"tip.position": "POS", "tip.velocity": "VEL", "joint.angle": "JNTANG"}
 """BIDS has no type for a joint's speed, nor for a stick: those are MISC."""
 
+NOT_STICKS = {"assist.": "the assistant's stick ", "estimate.": "values of the estimate "}
+"""What is recorded with the operator's sticks and is none of them, by the beginning of its name."""
+
 
 @dataclass(frozen=True)
 class TrackingSystem:
@@ -55,7 +58,7 @@ class TrackingSystem:
 
 
 def tracking_systems(session: SessionRecord, every: int) -> Iterator[TrackingSystem]:
-    """Yield the crane, what an assistant shares with the operator, and each stick."""
+    """Yield the crane, what an assistant shares, each stick, and each estimate."""
     state, axes, command = (session.streams[name] for name in ("state", "input", "command"))
     yield _system("crane", "the simulated machine", state, list(state.units), every)
     if shared := [column for column in command.units if column.startswith("assist.")]:
@@ -66,10 +69,15 @@ def tracking_systems(session: SessionRecord, every: int) -> Iterator[TrackingSys
         sticks.setdefault(column.rpartition(".")[0] or "input", []).append(column)
     for stick, columns in sticks.items():
         name = {"left": "joyL", "right": "joyR"}.get(stick, "".join(filter(str.isalnum, stick)))
-        whose, which = "the operator's", stick
-        if stick.startswith("assist."):
-            whose, which = "the assistant's", stick.removeprefix("assist.")
-        yield _system(name, f"{whose} {which} stick", axes, columns, every)
+        about = next(
+            (
+                text + stick.removeprefix(of)
+                for of, text in NOT_STICKS.items()
+                if stick.startswith(of)
+            ),
+            f"the operator's {stick} stick",
+        )
+        yield _system(name, about, axes, columns, every)
 
 
 def _system(
