@@ -26,6 +26,9 @@ STREAM = "labcrane.estimate."
 
 MOST_A_TICK = 64
 
+AHEAD_S = 0.05
+"""How far ahead of now a value's time may be: by as much as a source's clock may be off."""
+
 
 class State(IntEnum):
     """State of an estimate; with any but ``OK`` its fallback is used."""
@@ -35,6 +38,7 @@ class State(IntEnum):
     NO_DATA = 2
     NOT_A_NUMBER = 3
     LATE = 4
+    AHEAD = 5
 
 
 WORDS: Mapping[State, str] = {
@@ -42,6 +46,7 @@ WORDS: Mapping[State, str] = {
     State.NO_DATA: "no data come",
     State.NOT_A_NUMBER: "a value is not a number",
     State.LATE: "its newest value is too old",
+    State.AHEAD: "the time of its newest value is still to come",
 }
 
 
@@ -117,8 +122,9 @@ class Received:
             if self._state in {State.OK, State.NOT_A_NUMBER}:
                 self._time = stamps[-1]
         state = self._state
-        if state is State.OK and now - self._time > self._oldest:
-            state = State.LATE
+        if state is State.OK:
+            age = now - self._time
+            state = State.AHEAD if age < -AHEAD_S else State.LATE if age > self._oldest else state
         if state is State.OK and self._row is not None:
             out[: self._size] = self._row[: self._size]
         out[-2:] = self._time, state

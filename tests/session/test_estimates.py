@@ -20,6 +20,7 @@ from labcrane.replay.replay import replay_session
 from labcrane.session.session import run
 from labcrane.session.visit import Visit
 from labcrane.types import FloatArray
+from labcrane_estimates.settings import BandPowerSettings
 
 SHARE = "{estimate: load.ratio, between: [1, 3], to: [0, 0.8], at_most_per_s: 0.5}"
 STUDY = (
@@ -100,6 +101,38 @@ def test_each_change_of_state_is_an_event_and_the_fallback_is_in_the_same_tick(
     assert set(changes) <= set(events["tick"]) <= {0, *changes}
     whys = {data.get("why") for data in events["data"]}
     assert whys == {None, WORDS[State.LATE], WORDS[State.NOT_A_NUMBER]}
+
+
+def test_a_value_of_a_time_to_come_is_never_used_nor_one_that_is_too_old(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A source's clock that steps, or times of another clock, do not keep a value alive."""
+
+    class Newest:
+        def __init__(self, _: object) -> None:
+            pass
+
+        def pull(self, _: int) -> tuple[list[list[float]], list[float]]:
+            return ([[3.0, stamp, stamp, 0.0]], [stamp]) if (stamp := stamps.pop(0)) else ([], [])
+
+    monkeypatch.setattr("labcrane.streams.newest.NewestSample", Newest)
+    settings = BandPowerSettings(
+        stream="eeg", channels=("Fz",), per_channels=("Pz",), fallback={"ratio": 2.0}
+    )
+    ages = (0.1, 1.9, 2.1, -0.04, -0.06, -1.8e9, 0.3)
+    received = estimated.Received("load", settings, "any")
+    for age in ages:
+        stamps = [100.0 - age]
+        out = np.array([2.0, math.nan, State.NO_DATA])
+        received.fill(out, 100.0)
+        state = State.LATE if age > 2.0 else State.AHEAD if age < -0.05 else State.OK
+        assert out[2] == state
+        assert out[0] == (3.0 if state is State.OK else 2.0)
+    stamps = [0.0] * 3
+    received.fill(out, 101.5)
+    assert (out[0], out[2]) == (3.0, State.OK), "the newest, still young enough"
+    received.fill(out := np.array([2.0, math.nan, State.NO_DATA]), 103.0)
+    assert (out[0], out[2]) == (2.0, State.LATE)
 
 
 def test_the_share_goes_to_where_the_value_maps_and_never_faster_than_its_limit(

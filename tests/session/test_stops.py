@@ -341,7 +341,7 @@ def stops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> type[Stops]:
     study = stoppable(tmp_path)
     # What a session knows of the computer and its packages takes longer than all its ticks.
     monkeypatch.setattr(session_module, "context", lambda *_: {})
-    monkeypatch.setattr(Rig, "build", lambda study, simulated: idle_rig(study))
+    monkeypatch.setattr(Rig, "build", lambda study, **_: idle_rig(study))
     return type("StopsHere", (Stops,), {"folder": tmp_path, "study": study})
 
 
