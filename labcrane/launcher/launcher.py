@@ -295,7 +295,7 @@ class Launcher:
         if self._recordings and self._recorder:
             self._recordings.watch(self._say)
             self._recorder.offer(self._recordings.sends)
-        if self._estimates is not None and self._recorder:
+        if self._estimates is not None and self._recorder and self._visit.study.estimates:
             self._estimates.watch(self._recorder.status.get("streams", ()), self._say)
             self._recorder.offer(self._estimates.sends)
 

@@ -70,6 +70,7 @@ monitors:
   brain: {use: eeg_signal}
 assist:
   use: toward_target
+  axes: [left.trigger, left.x, left.y, right.x, right.y]
   share: {estimate: load.ratio, between: [1, 2], to: [0, 1], at_most_per_s: 0.1}
 estimates:
   load:
