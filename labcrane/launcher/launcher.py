@@ -27,9 +27,11 @@ from labcrane.session.commands import (
     Message,
     Order,
     QueueConsole,
+    Sent,
     StreamBack,
     StreamConfirmed,
     StreamLost,
+    StreamOffered,
     given_by,
 )
 from labcrane.session.eligibility import Admission, check_eligibility, close_visit
@@ -90,6 +92,7 @@ class Launcher:
         self._recordings: RecordingProcesses | None = None
         self._estimates: EstimateProcesses | None = None
         self._lost: set[str] = set()
+        self._described: set[str] = set()
         self._taken: set[str] = set()
         self._signals = SignalReporter(say)
         self._kept: list[Message] = []
@@ -271,6 +274,7 @@ class Launcher:
                 session.kill()  # its journal is whole; the exit code is passed on as any other
             self._watch_streams(session.send)
             self._watch_recordings()
+            self._offer_estimates(session.send)
             if self._feedback:
                 for news in self._feedback.watch(self._say):
                     session.send(news)
@@ -298,6 +302,13 @@ class Launcher:
         if self._estimates is not None and self._recorder and self._visit.study.estimates:
             self._estimates.watch(self._recorder.status.get("streams", ()), self._say)
             self._recorder.offer(self._estimates.sends)
+
+    def _offer_estimates(self, send: Callable[[Sent], None]) -> None:
+        """Describe new streams of values to the session: no search finds them for certain."""
+        sends = self._estimates.sends if self._estimates is not None else ()
+        for description in set(sends) - self._described:
+            self._described.add(description)
+            send(StreamOffered(description))
 
     def _watch_streams(self, send: Callable[[Message], None]) -> None:
         recorder = self._recorder

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from labcrane.core.records import Event
 from labcrane.launcher.session_process import Offered, SessionEnded
 from labcrane.processes.handle import Patience, ProcessHandle
-from labcrane.session.commands import Message, MessageError, encode
+from labcrane.session.commands import MessageError, Sent, encode
 from labcrane.session.visit import Visit
 
 MODULE = "labcrane.launcher.session_process"
@@ -33,7 +33,7 @@ class SessionHandle:
         self._process = ProcessHandle(MODULE, "session", Patience(stop_s=math.inf))
         self._process.start(pickle.dumps(visit))
 
-    def send(self, message: Message) -> None:
+    def send(self, message: Sent) -> None:
         """Send a message, without waiting; say so when it cannot be sent."""
         try:
             line = encode(message)

@@ -22,9 +22,11 @@ from labcrane.session.commands import (
     Message,
     MessageError,
     Order,
+    StreamOffered,
     decode,
 )
 from labcrane.session.session import record
+from labcrane.streams.newest import offer
 
 MOST_A_TICK = 16
 """Orders taken up in one tick; what else has come waits for the next."""
@@ -77,7 +79,11 @@ class ParentConsole:
     def _receive(self) -> None:
         for line in self._parent.incoming():
             try:
-                self._incoming.put(decode(line))
+                message = decode(line)
+                if isinstance(message, StreamOffered):
+                    offer(message.description)
+                else:
+                    self._incoming.put(message)
             except MessageError as error:
                 self._incoming.put(Command(Order.DENIED, str(error)))
         self._incoming.put(LauncherGone())

@@ -280,14 +280,26 @@ ProcessReport = (
 
 Message = Command | ProcessReport
 
-MESSAGE: TypeAdapter[Message] = TypeAdapter(Message)
+
+@dataclass(frozen=True, slots=True)
+class StreamOffered:
+    """A process of the run sends a stream: its description, so that nobody searches for it."""
+
+    description: str
+    kind: Literal["stream offered"] = "stream offered"
+
+
+Sent = Message | StreamOffered
+"""What goes to a session's process: messages to the session, and what only receivers need."""
+
+MESSAGE: TypeAdapter[Sent] = TypeAdapter(Sent)
 
 
 class MessageError(LabcraneError):
     """Something that cannot be sent to a session."""
 
 
-def encode(message: Message) -> bytes:
+def encode(message: Sent) -> bytes:
     """Return a message as it crosses the pipe.
 
     Raises
@@ -308,7 +320,7 @@ def encode(message: Message) -> bytes:
     return line
 
 
-def decode(line: bytes) -> Message:
+def decode(line: bytes) -> Sent:
     """Return the message that :func:`encode` wrote.
 
     Raises

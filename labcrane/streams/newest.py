@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from labcrane.errors import StreamError
-from labcrane.streams.search import Search, equal
+from labcrane.streams.search import Search, equal, known_stream
 
 if TYPE_CHECKING:
     import pylsl
@@ -22,6 +22,10 @@ SILENT_S = 5.0
 
 MOST = 4096
 MOST_A_TICK = 64
+
+_offered: list[str] = []
+"""Descriptions of streams that other processes of the run send, without a search; the newest
+last."""
 
 _open: "weakref.WeakSet[NewestSample]" = weakref.WeakSet()
 
@@ -58,6 +62,8 @@ class NewestSample:
     ) -> None:
         self.complaint = ""
         self.info: pylsl.StreamInfo | None = None
+        self._wanted = wanted
+        self._tried: set[str] = set()
         self._predicate = equal(**wanted)
         self._accept = accept
         self._buffer_s = buffer_s
@@ -145,6 +151,9 @@ class NewestSample:
                 self._lost.wait(LOOK_S)
                 continue
             self._lost.clear()
+            if self._inlet is None and (offered := self._of_offered()) is not None:
+                self._open(offered)
+                continue
             search = search or Search(self._predicate, forget_s=3.0)
             found = search.wait(LOOK_S)
             there = {info.uid() for info in found}
@@ -155,6 +164,16 @@ class NewestSample:
                 self._over.wait(LOOK_S)
         if search is not None:
             search.close(patience_s=6.0)
+
+    def _of_offered(self) -> "pylsl.StreamInfo | None":
+        """Return the newest offered stream that is wanted and was not tried before."""
+        for description in reversed(_offered[:]):
+            if description in self._tried or (info := known_stream(description)) is None:
+                continue
+            if all(getattr(info, key)() == value for key, value in self._wanted.items()):
+                self._tried.add(description)
+                return info
+        return None
 
     def _open(self, info: "pylsl.StreamInfo") -> None:
         import pylsl  # noqa: PLC0415
@@ -178,6 +197,11 @@ class NewestSample:
         self.complaint, self.info, self._came = "", whole, time.monotonic()
         self._inlet = inlet
         self._connected.set()
+
+
+def offer(description: str) -> None:
+    """Say that a process of this computer sends a stream, by its description in XML."""
+    _offered.append(description)
 
 
 def numeric_labels(info: "pylsl.StreamInfo") -> list[str]:

@@ -25,6 +25,7 @@ from labcrane.session.commands import (
     StreamBack,
     StreamConfirmed,
     StreamLost,
+    StreamOffered,
     decode,
     encode,
 )
@@ -39,6 +40,7 @@ MESSAGES = st.one_of(
     st.builds(FeedbackLost, WORDS, WORDS, st.booleans(), st.integers(0, 9), st.integers(0, 9)),
     st.builds(FeedbackReady, WORDS, WORDS),
     st.just(LauncherGone()),
+    st.builds(StreamOffered, WORDS),
 )
 
 

@@ -11,7 +11,7 @@ import pytest
 from faults.sessions import unique, wait_for
 
 from labcrane.errors import StreamError
-from labcrane.streams import NewestSample, numeric_labels
+from labcrane.streams import NewestSample, newest, numeric_labels
 from labcrane.streams.search import PORTS, equal, find, known_stream
 
 SENDS = """
@@ -168,3 +168,24 @@ def test_a_process_that_loses_its_stream_ends_without_an_abort(number: int) -> N
     _, said = process.communicate("now\n", timeout=240)
     assert process.returncode == 0, said
     assert "terminate" not in said
+
+
+@pytest.mark.slow
+def test_an_offered_stream_is_received_where_no_search_finds_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where liblsl's ports are used up, no stream answers a search."""
+    name = unique("offered")
+    gone, here = (
+        pylsl.StreamOutlet(pylsl.StreamInfo(name, "Test", 1, 0.0, "double64", f"{name}-{which}"))
+        for which in ("gone", "here")
+    )
+    newest.offer(gone.get_info().as_xml())
+    del gone  # its process has died, and another one was started
+    monkeypatch.setattr(newest.Search, "wait", lambda *_: [])
+    with closing(NewestSample({"name": name})) as stream:
+        assert not stream.wait(0.3)
+        newest.offer(here.get_info().as_xml())
+        assert stream.wait(10.0)
+        here.push_sample([3.0])
+        wait_for(lambda: stream.newest() == [3.0])
