@@ -10,9 +10,10 @@ from labcrane.core.signals import Layout, Signal
 from labcrane.design.plan import plan_session
 from labcrane.files.pseudonyms import pseudonyms
 from labcrane.protocol.design import CONDITION
+from labcrane.protocol.estimated import OF_ESTIMATE
 from labcrane.protocol.protocol import ASSIST
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import Study
+from labcrane.protocol.study import ESTIMATES, Study
 from labcrane.recording.frame_log import LOOP
 from labcrane.recording.trial_columns import OWN, trial_definitions, trial_units
 
@@ -56,8 +57,15 @@ def codebook(study: Study) -> list[CodebookColumn]:
     parts = Rig.build(study, simulated=False)
     tasks = {choice.name: choice for choice in study.task_choices.values()}
     task_source = ", ".join(f"{choice.plugin}: {choice.name}" for choice in tasks.values())
-    helper = study.choices.get(ASSIST)
-    assist = f"{helper.plugin}: {helper.name}" if helper else ""
+    beside = {
+        ASSIST: ASSIST,
+        **{f"{ESTIMATES}{each}": OF_ESTIMATE + each for each in study.estimates},
+    }
+    own = {
+        f"{columns}.": f"{choice.plugin}: {choice.name}"
+        for part, columns in beside.items()
+        if (choice := study.choices.get(part))
+    }
     found = [CodebookColumn("loop", each.name, each.unit, CORE, each.definition) for each in LOOP]
     for table, component, source in (
         ("input", parts.input, f"{study.input.plugin}: {study.input.name}"),
@@ -68,7 +76,12 @@ def codebook(study: Study) -> list[CodebookColumn]:
         layout = Layout(table, component.signals)
         names = zip(layout.columns, layout.units, strict=True)
         found += [
-            CodebookColumn(table, name, unit, assist if name.startswith(f"{ASSIST}.") else source)
+            CodebookColumn(
+                table,
+                name,
+                unit,
+                next((by for of, by in own.items() if name.startswith(of)), source),
+            )
             for name, unit in names
         ]
     found += [CodebookColumn("events", name, unit, CORE) for name, unit in EVENTS]

@@ -18,6 +18,7 @@ def methods(lock: Lock) -> str:
         f"({_use(protocol['dynamics'])}) with the input {_use(protocol['input'])} under the "
         f"scheme {_use(protocol['scheme'])}",
         *_assistant(protocol),
+        *_estimated(protocol, lock.content.get("settings", {})),
         f"The simulation ran at {_number(protocol.get('rate_hz', 240))} Hz, and every tick was "
         "recorded",
         *_parts(protocol, lock.content.get("settings", {})),
@@ -60,14 +61,29 @@ def _assistant(protocol: Mapping[str, Any]) -> list[str]:
     words = "a share" if isinstance(share, Mapping) else f"a share of {_value(share)}"
     if _follows(share):
         (first, last), (low, high) = share["between"], share["to"]
-        words = f"a share that followed the estimate {share['estimate']}, {_value(low)} at "
-        words += f"{_value(first)} and {_value(high)} at {_value(last)}, and changed by at most "
-        words += f"{_value(share['at_most_per_s'])} per second,"
+        words = f"a share that followed the estimate {share['estimate']} ({_value(low)} at "
+        words += f"{_value(first)}, {_value(high)} at {_value(last)}, changed by at most "
+        words += f"{_value(share['at_most_per_s'])} per second)"
     said = f"An assistant ({_use(assist)}) moved the machine together with them: the command of "
     said += f"each joint was a weighted mean of both, with {words} of the assistant"
     if takeover := assist.get("takeover"):
         said += f", and the participant's alone while {takeover} was pressed"
     return [said]
+
+
+def _estimated(protocol: Mapping[str, Any], settings: Mapping[str, Any]) -> list[str]:
+    """Return how each estimate was computed, with all of its settings."""
+    said = []
+    for name, given in protocol.get("estimates", {}).items():
+        whole = {**given, **settings.get(f"estimates.{name}", {})}
+        listed = "; ".join(
+            f"{key} {_value(value)}" for key, value in whole.items() if key not in {"use", "stream"}
+        )
+        said.append(
+            f"{name} was estimated by {_use(given)} from the stream {given['stream']} during the "
+            f"session ({listed})"
+        )
+    return said
 
 
 def _people(protocol: Mapping[str, Any]) -> list[str]:
