@@ -16,8 +16,8 @@ MODULE = "labcrane.estimation.process"
 START_S, SILENT_S, STOP_S = 60.0, 5.0, 5.0
 """How long a process may take to begin, may be silent then, and may take to end."""
 
-PAUSE_S = 1.0
-"""Between the end of a process and the start of the next one."""
+PAUSE_S, LONGEST_PAUSE_S = 1.0, 30.0
+"""Between the end of a process and the start of the next one; each pause is twice the last."""
 
 PROPERTIES = {"name": "name", "type": "type", "source_id": "source_id", "hostname": "host"}
 """What a stream is found by, and what the recorder's status calls it."""
@@ -78,6 +78,7 @@ class _Handle(ProcessHandle):
         self._told: Mapping[str, str] | None = None
         self._failed = self.sends = ""
         self._again: float | None = None
+        self._pause_s = PAUSE_S
         patience = Patience(START_S, SILENT_S, STOP_S)
         super().__init__(MODULE, f"estimate {config.name}", patience, self._hear_of)
         self.start(config)
@@ -92,7 +93,8 @@ class _Handle(ProcessHandle):
         if (why := self.failure) is not None:
             self.kill()
             self.ready, self._told = False, None
-            self._again = time.monotonic() + PAUSE_S
+            self._again = time.monotonic() + self._pause_s
+            self._pause_s = min(2.0 * self._pause_s, LONGEST_PAUSE_S)
             news = f"{self.name} failed: {self._failed or why}; it is started again"
             self._failed = self.sends = ""
             return news
