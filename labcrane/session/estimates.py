@@ -30,7 +30,7 @@ class EstimateReporter:
         console: Console,
     ) -> None:
         self._places = {name: axes.index(f"{OF_ESTIMATE}{name}.state") for name in estimates}
-        self._states = dict.fromkeys(estimates, State.OK)
+        self._states: dict[str, float | None] = dict.fromkeys(estimates)
         self._log, self._console = log, console
 
     def __call__(self, frame: Frame) -> None:
