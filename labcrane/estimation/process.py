@@ -14,6 +14,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from labcrane.core.records import Estimated
 from labcrane.core.roles import Estimate
 from labcrane.core.settings import EstimateSettings
 from labcrane.errors import LabcraneError
@@ -32,10 +33,6 @@ from labcrane.types import FloatArray
 
 PULL_S = 0.01
 BEAT_S = 0.5
-SILENT_S = 0.5
-"""After so long without samples the state is that no data come, but after three of a slow stream.
-A stream without a rate may pause for as long as it likes: its values become late."""
-
 ANSWER_S = 1.0
 
 
@@ -65,7 +62,7 @@ def run(config: EstimateConfig, parent: Parent) -> None:
             if now - beaten >= BEAT_S:
                 beaten = now
                 parent.tell({"beat": True})
-                if now - came > (SILENT_S if source is None else source.silent_s):
+                if now - came > settings.at_most_age_s:
                     outlet.push_nothing(now)
     finally:
         if source is not None:
@@ -81,7 +78,6 @@ class _Source:
         self._need, self._estimate = need, estimate
         self._uid = ""
         self._latency_s = 0.0
-        self.silent_s = SILENT_S
 
     def new(self) -> tuple[FloatArray, FloatArray]:
         """Return times and samples that have come since the last call."""
@@ -96,8 +92,6 @@ class _Source:
             header = StreamHeader.from_xml(info.as_xml())
             self._estimate.begin(signal_stream(header))
             self._latency_s = self._need.treatment(header).latency_s
-            rate_hz = header.rate_hz
-            self.silent_s = max(SILENT_S, 3.0 / rate_hz) if rate_hz else math.inf
         try:
             offset = self._stream.time_correction(ANSWER_S)
         except (pylsl.util.TimeoutError, pylsl.util.LostError):
@@ -125,6 +119,7 @@ class _Outlet:
             unit = "seconds" if label in {"first", "last"} else "none"
             channel(info, label=label, unit=unit, type="Estimate")
         self._outlet = SampleOutlet(info, len(columns))
+        self._newest: Estimated | None = None
 
     @property
     def description(self) -> str:
@@ -139,6 +134,9 @@ class _Outlet:
         if found is None:
             self._send(np.full(self._size, np.nan), last, math.nan, last, State.WARMING_UP)
             return
+        if found == self._newest:
+            return  # nothing new was computed
+        self._newest = found
         values = np.array(found.values)
         state = State.OK if np.isfinite(values).all() else State.NOT_A_NUMBER
         self._send(values, found.time, found.first, last, state)

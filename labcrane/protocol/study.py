@@ -582,6 +582,9 @@ def _check_estimates(
         if not name.isidentifier():
             message = f"{name!r} names columns; give a word of letters, digits and underscores"
             source.problem(("estimates", name), message, key=True)
+        if own := {"time", "state"} & set(settings.values):
+            message = f"{', '.join(sorted(own))} names a column of every estimate; rename the value"
+            source.problem(("estimates", name, "use"), message)
         if name in taken:
             message = f"{name!r} is already the name of a secondary task"
             source.problem(("estimates", name), message, key=True)

@@ -37,8 +37,12 @@ class Window:
         self._began = np.nan
 
     def take(self, times: FloatArray, samples: FloatArray) -> bool:
-        """Take the next samples; return whether the window has been filled."""
-        if np.isnan(self._began):
+        """Take the next samples; return whether the window has been filled.
+
+        It begins anew where times go back: the source's clock was set.
+        """
+        if np.isnan(self._began) or (len(self.times) and times[0] < self.times[-1]):
+            self.times, self.samples = self.times[:0], self.samples[:0]
             self._began = float(times[0])
         since = times[-1] - self._seconds
         self.times = np.concatenate([self.times, times])
