@@ -3,9 +3,10 @@
     python -m benchmarks.real_time [SECONDS]
 
 The load: the pages, two software views, a sound by a JACK server, a film of generated pictures that
-are compressed here, and the recording of 64 channels at 1 kHz. The reference is an empty loop that
-ticked alone before. The performance targets apply to ``--real-time``; lines above the table give
-the lateness without it. Needs jackd and real-time priorities. Nothing leaves this computer.
+are compressed here, the recording of 64 channels at 1 kHz, and an estimate of two of them. The
+reference is an empty loop that ticked alone before. The performance targets apply to
+``--real-time``; lines above the table give the lateness without it. Needs jackd and real-time
+priorities. Nothing leaves this computer.
 """
 
 import os
@@ -18,6 +19,7 @@ import numpy as np
 
 from benchmarks.beside import QUARTER_MS, RATE_HZ, TESTS, late_ms
 from benchmarks.table import Row, dumped, loaded, show
+from labcrane import open_recording
 from labcrane.core.clock import SystemClock
 from labcrane.doctor.scheduling import lateness
 from labcrane.streams.network import LOOPBACK
@@ -37,6 +39,8 @@ feedback:
 views:
   operator: {{use: view, display: hidden, renderer: software, size: [640, 360], rate_hz: 30}}
   examiner: {{use: view, display: hidden, renderer: software, size: [640, 360], rate_hz: 30}}
+estimates:
+  load: {{use: band_power, stream: eeg, channels: [C1], per_channels: [C2], fallback: {{ratio: 1}}}}
 recordings:
   cab:
     {{use: camera, format: lavfi, device: "testsrc2=size=640x360:rate=30,realtime", consent: none}}
@@ -115,6 +119,8 @@ def session(folder: Path, name: str, seconds: float, words: tuple[str, ...]) -> 
         devices.communicate()
     kept = folder / "data" / f"{name}-SIMULATED"
     assert list(kept.rglob("*.mkv")), "nothing was filmed"
+    estimated = open_recording(kept / f"{name}-SIMULATED.h5").session(1).streams["input"].data
+    assert (estimated["estimate.load.state"] == 0.0).any(), "nothing was estimated"
     _, late = late_ms(kept / f"{name}-SIMULATED.h5")
     return late
 

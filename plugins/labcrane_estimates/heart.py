@@ -5,10 +5,8 @@ import math
 import numpy as np
 from scipy.signal import butter, find_peaks, sosfiltfilt
 
-from labcrane import Estimate, FloatArray
-from labcrane.core import Estimated, SignalStream
+from labcrane_estimates.once_a_second import OnceASecond
 from labcrane_estimates.settings import HeartSettings
-from labcrane_estimates.window import Window
 
 BAND_HZ = (5.0, 20.0)
 """Where the energy of a QRS complex is (Pan and Tompkins 1985: 5 to 15 Hz)."""
@@ -18,24 +16,8 @@ FEWEST = 3
 """Peaks from which both values can be computed."""
 
 
-class Heart(Estimate):
-    """Gives both of the newest window, once a second; NaN where there are too few beats."""
-
-    def __init__(self, settings: HeartSettings) -> None:
-        self._settings = settings
-
-    def begin(self, stream: SignalStream) -> None:
-        self._window = Window(stream, [self._settings.channel], self._settings.window_s)
-        self._rate_hz = stream.rate_hz
-        self._newest: Estimated | None = None
-
-    def update(self, times: FloatArray, samples: FloatArray) -> Estimated | None:
-        if not self._window.take(times, samples):
-            return None
-        if self._newest is None or times[-1] - self._newest.time >= 1.0:
-            values = self._values() if self._window.whole else (math.nan, math.nan)
-            self._newest = Estimated(float(times[-1]), float(self._window.times[0]), values)
-        return self._newest
+class Heart(OnceASecond[HeartSettings]):
+    """Gives both of the newest window; NaN where there are too few beats."""
 
     def _values(self) -> tuple[float, float]:
         band = butter(2, BAND_HZ, "bandpass", fs=self._rate_hz, output="sos")

@@ -57,6 +57,21 @@ class HeartSettings(EstimateSettings):
     """Time from which both are computed, in seconds."""
 
 
+class SkinSettings(EstimateSettings):
+    """Skin conductance responses per minute, from an EDA."""
+
+    values: ClassVar[tuple[str, ...]] = ("rate",)
+
+    channel: str
+    """Label of the channel of the conductance."""
+
+    window_s: PositiveFloat = 60.0
+    """Time over which responses are counted, in seconds."""
+
+    smallest: PositiveFloat = 0.05
+    """Amplitude from which a rise is a response, in the channel's unit: 0.05 uS (Boucsein 2012)."""
+
+
 class PupilSettings(EstimateSettings):
     """The change of the pupil's size against its baseline: 0.1 is 10 % larger."""
 

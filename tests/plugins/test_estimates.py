@@ -12,11 +12,18 @@ from labcrane.testing import EstimateContract, ch8
 from labcrane_estimates.band_power import BandPower
 from labcrane_estimates.heart import Heart
 from labcrane_estimates.pupil import Pupil
-from labcrane_estimates.settings import BandPowerSettings, HeartSettings, PupilSettings
+from labcrane_estimates.settings import (
+    BandPowerSettings,
+    HeartSettings,
+    PupilSettings,
+    SkinSettings,
+)
+from labcrane_estimates.skin import Skin
 
 RATE_HZ = 250.0
 EEG = SignalStream("cap", "EEG", RATE_HZ, (SignalChannel("Fz"), SignalChannel("Pz")))
 ECG = SignalStream("belt", "ECG", RATE_HZ, (SignalChannel("lead"),))
+EDA = SignalStream("hand", "EDA", 50.0, (SignalChannel("palm"),))
 EYE = SignalStream("eye", "Gaze", 60.0, (SignalChannel("pupil"),))
 LOAD = BandPowerSettings(
     stream="eeg", fallback={"ratio": 1.0}, channels=("Fz",), per_channels=("Pz",)
@@ -24,6 +31,7 @@ LOAD = BandPowerSettings(
 HEART = HeartSettings(
     stream="ecg", fallback={"rate": 70.0, "rmssd": 40.0}, channel="lead", window_s=20.0
 )
+SKIN = SkinSettings(stream="eda", fallback={"rate": 5.0}, channel="palm")
 PUPIL = PupilSettings(stream="eye", fallback={"change": 0.0}, channel="pupil", baseline_s=5.0)
 
 
@@ -45,6 +53,15 @@ def ecg(beats: FloatArray, seconds: float) -> FloatArray:
     since = t[:, None] - beats
     waves = np.exp(-0.5 * (since / 0.01) ** 2) + 0.25 * np.exp(-0.5 * ((since - 0.25) / 0.05) ** 2)
     return (waves.sum(axis=1) + 0.5 * np.sin(2 * np.pi * 0.2 * t))[:, None]
+
+
+def eda(onsets: FloatArray, amplitudes: FloatArray, drift: float = 0.0) -> FloatArray:
+    """Return a minute of conductance: responses that rise in 1.5 s and fall over 4 s, and noise."""
+    t = np.arange(round(61 * EDA.rate_hz)) / EDA.rate_hz
+    since = np.clip(t[:, None] - onsets, 0.0, None)
+    shape = np.exp(-since / 4.0) - np.exp(-since / 0.75)
+    level = 5.0 + drift * t + (shape / shape.max(axis=0, initial=1e-9) * amplitudes).sum(axis=1)
+    return (level + np.random.default_rng(3).normal(0.0, 0.002, len(t)))[:, None]
 
 
 def values(estimate: Estimate, stream: SignalStream, samples: FloatArray) -> tuple[float, ...]:
@@ -90,6 +107,24 @@ class TestHeart(EstimateContract):
         return ecg(np.arange(0.5, 25.0, 0.8), 25.0)
 
 
+class TestSkin(EstimateContract):
+    @pytest.fixture
+    def settings(self) -> EstimateSettings:
+        return SKIN
+
+    @pytest.fixture
+    def estimate(self) -> Estimate:
+        return built("skin", SKIN)
+
+    @pytest.fixture
+    def stream(self) -> SignalStream:
+        return EDA
+
+    @pytest.fixture
+    def clean(self) -> FloatArray:
+        return eda(np.arange(5.0, 50.0, 8.0), np.full(6, 0.3))
+
+
 class TestPupil(EstimateContract):
     @pytest.fixture
     def settings(self) -> EstimateSettings:
@@ -120,6 +155,16 @@ def test_the_rate_and_rmssd_are_those_of_the_beats() -> None:
     rate, rmssd = values(Heart(HEART), ECG, ecg(beats, 24.0))
     assert rate == pytest.approx(75.0, rel=0.01)
     assert rmssd == pytest.approx(40.0, abs=4.0)  # a sample is 4 ms
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_rate_of_responses_is_that_of_those_that_are_large_enough(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    onsets = 4.0 + np.cumsum(draw.uniform(6.0, 9.0, 6))
+    amplitudes = draw.choice([0.01, 0.15, 0.6], 6)
+    samples = eda(onsets, amplitudes, drift=draw.uniform(-0.005, 0.002))
+    (rate,) = values(Skin(SKIN), EDA, samples)
+    assert rate == np.count_nonzero(amplitudes > 0.1)
 
 
 def test_a_pupil_that_grows_by_a_tenth_has_a_change_of_a_tenth_and_blinks_are_left_out() -> None:
