@@ -202,7 +202,7 @@ def _about(study: Study, registry: Registry, consent: Path | None = None) -> dic
         "settings": {
             part: _settings(study, part)
             for part in study.choices
-            if part.startswith(("tasks.", "feedback."))
+            if part.startswith(("tasks.", "estimates.", "feedback."))
         },
         "codebook": codebook.rows(codebook.codebook(study)),
     }

@@ -18,7 +18,6 @@ def methods(lock: Lock) -> str:
         f"({_use(protocol['dynamics'])}) with the input {_use(protocol['input'])} under the "
         f"scheme {_use(protocol['scheme'])}",
         *_assistant(protocol),
-        *_estimated(protocol, lock.content.get("settings", {})),
         f"The simulation ran at {_number(protocol.get('rate_hz', 240))} Hz, and every tick was "
         "recorded",
         *_parts(protocol, lock.content.get("settings", {})),
@@ -71,21 +70,6 @@ def _assistant(protocol: Mapping[str, Any]) -> list[str]:
     return [said]
 
 
-def _estimated(protocol: Mapping[str, Any], settings: Mapping[str, Any]) -> list[str]:
-    """Return how each estimate was computed, with all of its settings."""
-    said = []
-    for name, given in protocol.get("estimates", {}).items():
-        whole = {**given, **settings.get(f"estimates.{name}", {})}
-        listed = "; ".join(
-            f"{key} {_value(value)}" for key, value in whole.items() if key not in {"use", "stream"}
-        )
-        said.append(
-            f"{name} was estimated by {_use(given)} from the stream {given['stream']} during the "
-            f"session ({listed})"
-        )
-    return said
-
-
 def _people(protocol: Mapping[str, Any]) -> list[str]:
     planned = protocol.get("participants", {}).get("planned", 1)
     said = [f"It was planned with {planned} participant{'s' * (planned != 1)}, under pseudonyms"]
@@ -101,12 +85,13 @@ def _people(protocol: Mapping[str, Any]) -> list[str]:
 
 
 def _parts(protocol: Mapping[str, Any], settings: Mapping[str, Any]) -> list[str]:
-    """Return the tasks and feedback with the protocol's words for each, and tasks' other settings.
+    """Return tasks, estimates and feedback with the protocol's words for each.
 
-    Rules of onset and end are among them. An early lock has neither units nor the others.
+    All but feedback has its other settings, too: rules of onset and end are among them. An early
+    lock has neither units nor the others.
     """
     said = []
-    for kind, plural in (("task", "tasks"), ("feedback", "feedback")):
+    for kind, plural in (("task", "tasks"), ("estimate", "estimates"), ("feedback", "feedback")):
         for name, given in protocol.get(plural, {}).items():
             of_it = settings.get(f"{plural}.{name}", {})
             units = {key: each["unit"] for key, each in of_it.items()}
@@ -117,7 +102,7 @@ def _parts(protocol: Mapping[str, Any], settings: Mapping[str, Any]) -> list[str
                 for key, each in of_it.items()
                 if not each["written"] and each["value"] not in (None, "", [], {})
             }
-            if kind == "task" and others:
+            if kind != "feedback" and others:
                 said[-1] += f"; by default: {_listed(others, units)}"
     return said
 

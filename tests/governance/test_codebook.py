@@ -126,6 +126,28 @@ def test_the_methods_name_the_assistant_and_its_share_in_each_condition(tmp_path
         assert words in said
 
 
+def test_the_methods_and_the_codebook_name_each_estimate(tmp_path: Path) -> None:
+    estimates = (
+        "streams: {eeg: {name: Amplifier}}\n"
+        "estimates: {load: {use: band_power, stream: eeg, channels: [Fz], per_channels: [Pz], "
+        "fallback: {ratio: 1}}}\n"
+    )
+    assisted = "assist: {use: toward_target, share: {estimate: load.ratio, between: [1, 3], "
+    assisted += "to: [0, 0.8], at_most_per_s: 0.2}}\n"
+    lab = Lab(tmp_path, GROUPED.replace("tasks:", f"{estimates}{assisted}tasks:"))
+    lock = lab.approve()
+    said = methods(lock)
+    for words in (
+        "The estimate load (band power) had these settings: stream eeg; ",
+        "; by default: at most age 2 s; band 4 and 8 Hz; per band 8 and 13 Hz; window 2 s. ",
+        "with a share that followed the estimate load.ratio (0 at 1, 0.8 at 3, changed by at most "
+        "0.2 per second) of the assistant. ",
+    ):
+        assert words in said
+    sources = {row["name"]: row["source"] for row in lock.content["codebook"]}
+    assert sources["estimate.load.ratio"] == "estimates: band_power"
+
+
 TRAINED = GROUPED.replace("design:", "design:\n  primary: [movement_time, absolute_error]").replace(
     "  - name: only",
     "  - name: before\n    steps:\n"
