@@ -188,6 +188,18 @@ def test_missing_samples_give_no_number() -> None:
     assert math.isnan(found.values[0])
 
 
+def test_a_window_begins_anew_where_times_go_back() -> None:
+    samples = eeg(20.0, 10.0)
+    times = 100.0 + np.arange(len(samples)) / RATE_HZ
+    load = BandPower(LOAD)
+    load.begin(EEG)
+    assert load.update(times, samples) is not None
+    assert load.update(times[:250] - 50.0, samples[:250]) is None
+    found = load.update(times[250:510] - 50.0, samples[250:510])
+    assert found is not None
+    assert 50.0 <= found.first < 51.0
+
+
 def test_a_channel_that_is_not_there_is_refused_with_those_that_are() -> None:
     with pytest.raises(StreamError, match="no channel Fz, Pz; it has lead"):
         BandPower(LOAD).begin(ECG)
