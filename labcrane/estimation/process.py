@@ -17,23 +17,27 @@ import numpy as np
 from labcrane.core.records import Estimated
 from labcrane.core.roles import Estimate
 from labcrane.core.settings import EstimateSettings
-from labcrane.errors import LabcraneError
+from labcrane.errors import LabcraneError, StreamError
 from labcrane.estimation.config import EstimateConfig
 from labcrane.monitoring.monitored_stream import signal_stream
 from labcrane.processes.parent import Parent
-from labcrane.protocol.estimated import STREAM, State
+from labcrane.protocol.estimated import State
 from labcrane.protocol.streams import StreamNeed
 from labcrane.protocol.study import load
+from labcrane.recording.own_streams import ESTIMATED, STATED
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.registry.registry import discover
 from labcrane.registry.traceback import told
 from labcrane.streams.newest import NewestSample
 from labcrane.streams.outlets import SampleOutlet, channel, check_clock, stream_info
+from labcrane.streams.probes import Probe
 from labcrane.types import FloatArray
 
 PULL_S = 0.01
 BEAT_S = 0.5
 ANSWER_S = 1.0
+DRIFT = 1e-4
+"""How far a crystal in order drifts beyond what was measured last, as a share of the time."""
 
 
 def run(config: EstimateConfig, parent: Parent) -> None:
@@ -58,7 +62,7 @@ def run(config: EstimateConfig, parent: Parent) -> None:
             now = time.perf_counter()
             if source is not None and len((new := source.new())[0]):
                 came = now
-                outlet.push(*new, estimate)
+                outlet.push(*new, estimate, source.error_s)
             if now - beaten >= BEAT_S:
                 beaten = now
                 parent.tell({"beat": True})
@@ -71,18 +75,25 @@ def run(config: EstimateConfig, parent: Parent) -> None:
 
 
 class _Source:
-    """The stream that an estimate is computed from, on our clock as far as that is known."""
+    """The stream that an estimate is computed from, on our clock as far as that is known.
+
+    Attributes
+    ----------
+    error_s
+        By how much times may be off: half of the round trip in which the source's clock was
+        measured, and what it may have drifted since, by its last two measurements.
+    """
 
     def __init__(self, wanted: Mapping[str, str], need: StreamNeed, estimate: Estimate) -> None:
         self._stream = NewestSample(wanted)
         self._need, self._estimate = need, estimate
         self._uid = ""
-        self._latency_s = 0.0
+        self._latency_s = self.error_s = 0.0
+        self._clock: Probe | None = None
+        self._drift = DRIFT
 
     def new(self) -> tuple[FloatArray, FloatArray]:
         """Return times and samples that have come since the last call."""
-        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
-
         samples, stamps = self._stream.pull()
         info = self._stream.info
         nothing = np.empty(0), np.empty((0, 0))
@@ -93,13 +104,18 @@ class _Source:
             self._estimate.begin(signal_stream(header))
             self._latency_s = self._need.treatment(header).latency_s
         try:
-            offset = self._stream.time_correction(ANSWER_S)
-        except (pylsl.util.TimeoutError, pylsl.util.LostError):
+            clock = self._stream.clock(ANSWER_S)
+        except StreamError:
             return nothing  # times would be of another clock
         if info.uid() != self._uid:
             self._uid = info.uid()
             return nothing  # the first answer about the clock takes a while: these are late
-        return np.array(stamps) + (offset - self._latency_s), np.array(samples, np.float64)
+        if (last := self._clock) is not None and clock.remote_time > last.remote_time:
+            drifted = abs(clock.offset - last.offset) / (clock.remote_time - last.remote_time)
+            self._drift = DRIFT + drifted
+        self._clock = clock
+        self.error_s = clock.rtt / 2.0 + self._drift * (time.perf_counter() - clock.local)
+        return np.array(stamps) + (clock.offset - self._latency_s), np.array(samples, np.float64)
 
     def close(self) -> None:
         self._stream.close()
@@ -109,14 +125,14 @@ class _Outlet:
     """The stream of an estimate: values, first and last sample, and state, at the values' time."""
 
     def __init__(self, config: EstimateConfig, settings: EstimateSettings) -> None:
-        columns = (*settings.values, "first", "last", "state")
+        columns = (*settings.values, "first", "last", *STATED, "state")
         self._size = len(settings.values)
-        name = STREAM + config.name
+        name = ESTIMATED + config.name
         info = stream_info(
             name, "Estimate", len(columns), "double64", rate_hz=0.0, source=config.source
         )
         for label in columns:
-            unit = "seconds" if label in {"first", "last"} else "none"
+            unit = "seconds" if label in {"first", "last", *STATED} else "none"
             channel(info, label=label, unit=unit, type="Estimate")
         self._outlet = SampleOutlet(info, len(columns))
         self._newest: Estimated | None = None
@@ -126,29 +142,36 @@ class _Outlet:
         """The stream as XML."""
         return self._outlet.description
 
-    def push(self, times: FloatArray, samples: FloatArray, estimate: Estimate) -> None:
-        """Send what an estimate computes from its next samples."""
+    def push(
+        self, times: FloatArray, samples: FloatArray, estimate: Estimate, error_s: float
+    ) -> None:
+        """Send what an estimate computes from its next samples, whose times may be off so far."""
         with np.errstate(all="ignore"):  # sources send whatever they like
             found = estimate.update(times, samples)
         last = float(times[-1])
         if found is None:
-            self._send(np.full(self._size, np.nan), last, math.nan, last, State.WARMING_UP)
+            self._send(np.full(self._size, np.nan), last, (math.nan, last), State.WARMING_UP)
             return
         if found == self._newest:
             return  # nothing new was computed
         self._newest = found
         values = np.array(found.values)
         state = State.OK if np.isfinite(values).all() else State.NOT_A_NUMBER
-        self._send(values, found.time, found.first, last, state)
+        self._send(values, found.time, (found.first, last), state, error_s)
 
     def push_nothing(self, now: float) -> None:
         """Send that no data come."""
-        self._send(np.full(self._size, np.nan), now, math.nan, math.nan, State.NO_DATA)
+        self._send(np.full(self._size, np.nan), now, (math.nan, math.nan), State.NO_DATA)
 
     def _send(
-        self, values: FloatArray, stamp: float, first: float, last: float, state: State
+        self,
+        values: FloatArray,
+        stamp: float,
+        seen: tuple[float, float],
+        state: State,
+        error_s: float = 0.0,
     ) -> None:
-        self._outlet.push(np.array([*values, first, last, state]), stamp)
+        self._outlet.push(np.array([*values, *seen, error_s, state]), stamp)
 
 
 def main() -> int:

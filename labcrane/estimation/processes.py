@@ -6,7 +6,8 @@ from typing import Any
 
 from labcrane.estimation.config import EstimateConfig
 from labcrane.processes.handle import Patience, ProcessHandle
-from labcrane.protocol.estimated import OF_ESTIMATE, STREAM
+from labcrane.protocol.estimated import OF_ESTIMATE
+from labcrane.recording.own_streams import ESTIMATED
 from labcrane.session.visit import Visit
 from labcrane.streams.outlets import source_id
 from labcrane.streams.request import StreamRequest
@@ -64,7 +65,7 @@ def estimate_requests(visit: Visit) -> list[StreamRequest]:
     """Return the requests to the recorder: the streams of values."""
     return [
         StreamRequest(
-            OF_ESTIMATE + name, source_id=source_id(visit.source, STREAM + name), required=False
+            OF_ESTIMATE + name, source_id=source_id(visit.source, ESTIMATED + name), required=False
         )
         for name in visit.study.estimates
     ]

@@ -54,7 +54,7 @@ class Sensor:
             self._stream.close()
             raise StreamError(f"stream {name!r} has no channel {channel}; it has {there}")
         self._channel = channel - 1
-        self._offsets = [self._stream.time_correction(WAIT_S)]
+        self._offsets = [self._stream.clock(WAIT_S).offset]
         self._times: list[float] = []
         self._values: list[float] = []
 
@@ -74,7 +74,7 @@ class Sensor:
 
     def signal(self) -> tuple["np.ndarray", "np.ndarray", float]:
         """Return times in s on our clock, values, and samples per second."""
-        self._offsets.append(self._stream.time_correction(WAIT_S))
+        self._offsets.append(self._stream.clock(WAIT_S).offset)
         times = np.array(self._times) + float(np.mean(self._offsets))
         rate = (len(times) - 1) / (times[-1] - times[0])
         return times, np.array(self._values), float(rate)

@@ -16,13 +16,11 @@ from labcrane.core.records import Frame, Phase, Run, Trial, TrialStatus, Value
 from labcrane.core.roles import InputDevice, SecondaryTask
 from labcrane.core.settings import EstimateSettings
 from labcrane.core.signals import Layout, Signal
+from labcrane.recording.own_streams import ESTIMATED
 from labcrane.types import FloatArray
 
 OF_ESTIMATE = "estimate."
 """How the names of the columns begin: ``estimate.load.ratio``."""
-
-STREAM = "labcrane.estimate."
-"""How the names of the streams of estimates begin."""
 
 MOST_A_TICK = 64
 
@@ -109,7 +107,7 @@ class Received:
         from labcrane.streams.outlets import source_id  # noqa: PLC0415
 
         self._size, self._oldest = len(settings.values), settings.at_most_age_s
-        self._stream = NewestSample({"source_id": source_id(source, STREAM + name)})
+        self._stream = NewestSample({"source_id": source_id(source, ESTIMATED + name)})
         self._row: FloatArray | None = None
         self._time, self._state = math.nan, State.NO_DATA
 

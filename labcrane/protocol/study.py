@@ -38,6 +38,7 @@ from labcrane.protocol.references import Parts, ReferenceChecker, twice
 from labcrane.protocol.steps import Block
 from labcrane.protocol.tracks import Track
 from labcrane.recording.data_folder import DataFolder
+from labcrane.recording.own_streams import STATED
 from labcrane.registry.call_monitor import CallMonitor
 from labcrane.registry.registry import Registry
 
@@ -582,7 +583,7 @@ def _check_estimates(
         if not name.isidentifier():
             message = f"{name!r} names columns; give a word of letters, digits and underscores"
             source.problem(("estimates", name), message, key=True)
-        if own := {"time", "state"} & set(settings.values):
+        if own := {"time", "state", "first", "last", *STATED} & set(settings.values):
             message = f"{', '.join(sorted(own))} names a column of every estimate; rename the value"
             source.problem(("estimates", name, "use"), message)
         if name in taken:

@@ -14,12 +14,13 @@ from labcrane.core.findings import Finding, Verdict
 from labcrane.errors import LabcraneError, RecordingError
 from labcrane.protocol.streams import StreamNeed, TimeLimits
 from labcrane.recording.foreign_streams import RecordedStream
+from labcrane.recording.own_streams import ESTIMATED, stated_terms
 from labcrane.recording.participant_file.columns import text_of, write_attributes
 from labcrane.recording.participant_file.reader import SessionRecord, Stream, session_in
 from labcrane.recording.participant_file.recorrect import read_channel, read_stream
 from labcrane.recording.participant_file.session_group import write_sync_report
 from labcrane.recording.participant_file.stream_group import write_time, write_uncorrected
-from labcrane.recording.pictures import CAPTURED, LEVEL, LOG, TERMS
+from labcrane.recording.pictures import CAPTURED, LEVEL, LOG
 from labcrane.streams.edges import QUIET_S, Change
 from labcrane.streams.recorder.health import counter_label
 from labcrane.streams.sync.correction import Treatment, as_stated, correct
@@ -131,9 +132,8 @@ def _corrected(one: _Read, raw: RawStream, end: float | None, limits: Limits) ->
     """Write a stream's times, and return how right they are."""
     try:
         treatment = _treatment(one)
-        captured = one.recorded.header.name.startswith(CAPTURED)
-        if captured:
-            terms = {term: one.group[f"data/{term}"][:] for term in TERMS}
+        if stated := stated_terms(one.recorded.header.name):
+            terms = {term: one.group[f"data/{term}"][:] for term in stated}
             corrected = as_stated(raw.stamps, terms, end)
         else:
             corrected = correct(raw, treatment, end)
@@ -143,7 +143,8 @@ def _corrected(one: _Read, raw: RawStream, end: float | None, limits: Limits) ->
         write_uncorrected(one.group, why)
         return uncorrected_stream(one.recorded, why)
     write_time(one.group, columns_of(corrected), quality_of(corrected, treatment))
-    required = one.need is None or one.need.required
+    estimated = one.recorded.header.name.startswith(ESTIMATED)
+    required = not estimated if one.need is None else one.need.required
     return judge_stream(one.recorded, corrected.quality, limits, required=required)
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from labcrane.errors import StreamError
+from labcrane.streams.probes import ClockProbe, Probe
 from labcrane.streams.search import Search, equal, known_stream
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ class NewestSample:
         self._accept = accept
         self._buffer_s = buffer_s
         self._inlet: pylsl.StreamInlet | None = None
+        self._probe: ClockProbe | None = None
         self._came = time.monotonic()
         self._over = threading.Event()
         self._lost = threading.Event()
@@ -117,20 +119,22 @@ class NewestSample:
         samples, _ = self.pull(MOST_A_TICK)
         return samples[-1] if samples else None
 
-    def time_correction(self, wait_s: float) -> float:
-        """Return what must be added to its stamps to have our time, in seconds.
+    def clock(self, wait_s: float) -> Probe:
+        """Return the newest measurement of its source's clock; waits for the first one.
 
         Raises
         ------
-        pylsl.util.TimeoutError, pylsl.util.LostError
+        StreamError
             Its program does not answer, or is gone.
         """
-        import pylsl  # noqa: PLC0415
-
-        inlet = self._inlet
-        if inlet is None:
-            raise pylsl.util.LostError("the stream is not received")
-        return float(inlet.time_correction(timeout=wait_s))
+        probe = self._probe
+        if self._inlet is not None and probe is not None:
+            probe.new(wait_s)
+            if probe.newest is not None:
+                return probe.newest
+        raise StreamError(
+            f"the program of the stream {self._wanted} does not answer; start it again"
+        )
 
     def close(self) -> None:
         """Let go of the stream."""
@@ -195,6 +199,7 @@ class NewestSample:
             self._over.wait(LOOK_S)
             return
         self.complaint, self.info, self._came = "", whole, time.monotonic()
+        self._probe = ClockProbe(inlet)
         self._inlet = inlet
         self._connected.set()
 

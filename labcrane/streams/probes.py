@@ -38,7 +38,13 @@ class Probe(NamedTuple):
 
 
 class ClockProbe:
-    """Asks for the clock offset of an inlet. Not for use by several threads."""
+    """Asks for the clock offset of an inlet. Not for use by several threads.
+
+    Attributes
+    ----------
+    newest
+        The newest measurement; None before the first.
+    """
 
     def __init__(self, inlet: "pylsl.StreamInlet") -> None:
         import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
@@ -48,7 +54,7 @@ class ClockProbe:
         self._now = pylsl.local_clock
         self._ask = lib.lsl_time_correction_ex
         self._ask.restype = ctypes.c_double
-        self._last = 0.0
+        self.newest: Probe | None = None
 
     def new(self, wait_s: float = WAIT_S) -> Probe | None:
         """Return the newest measurement; None when there is none since the last call.
@@ -63,7 +69,7 @@ class ClockProbe:
             ctypes.c_double(wait_s),
             ctypes.byref(status),
         )
-        if status.value != 0 or remote.value == self._last:
+        if status.value != 0 or (self.newest and remote.value == self.newest.remote_time):
             return None
-        self._last = remote.value
-        return Probe(remote.value, float(offset), rtt.value, float(self._now()))
+        self.newest = Probe(remote.value, float(offset), rtt.value, float(self._now()))
+        return self.newest

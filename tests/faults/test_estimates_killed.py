@@ -129,3 +129,17 @@ def test_the_recorder_has_every_value_that_was_used(session) -> None:
     recorded = session.streams["labcrane.estimate.truth"].data
     ticks = used(session)
     assert set(ticks["sampled"]) <= set(recorded["sampled"])
+
+
+@pytest.mark.slow
+def test_the_stream_of_values_says_by_how_much_its_times_may_be_off(session) -> None:
+    stream = session.streams["labcrane.estimate.truth"]
+    valued = stream.data["sampled"].notna().to_numpy()
+    wrong = np.abs(stream.time - stream.data["sampled"].to_numpy())[valued]
+    assert valued.sum() > 100
+    assert np.mean(wrong <= stream.data["clock"][valued]) >= 0.95
+    (judged,) = (
+        one for one in session.sync_report["streams"] if one["name"] == "labcrane.estimate.truth"
+    )
+    assert judged["quality"]["unprobed"] == 0, "also of the one that was started again"
+    assert judged["verdict"] == "PASS", judged["findings"]

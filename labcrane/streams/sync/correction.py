@@ -189,10 +189,10 @@ MISSING_S = 1.0
 
 
 def as_stated(time: FloatArray, terms: Terms, end: float | None) -> Corrected:
-    """Return the times of captured frames: on our clock already, with a stated uncertainty.
+    """Return the times of our own processes: on our clock already, with a stated uncertainty.
 
-    The process that captures is on this computer and converts the device's stamps itself: neither
-    probes nor arrivals tell more. An error is NaN where one of its terms is unknown.
+    They are on this computer and convert a device's stamps themselves: neither probes nor arrivals
+    tell more. An error is NaN where one of its terms is unknown.
     """
     silent = end - float(time[-1]) if end is not None and len(time) else 0.0
     steps = np.diff(time)

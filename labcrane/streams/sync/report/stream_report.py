@@ -15,6 +15,7 @@ from labcrane.recording.foreign_streams import (
     UNSTAMPED,
     RecordedStream,
 )
+from labcrane.recording.own_streams import stated_terms
 from labcrane.recording.pictures import CAPTURED
 from labcrane.streams.probes import FASTER
 from labcrane.streams.sync.quality import Quality
@@ -74,15 +75,18 @@ def judge_stream(
     samples = len(recorded.time_raw)
     header = recorded.header
     captured = header.name.startswith(CAPTURED)
+    own = captured or bool(stated_terms(header.name))
     if samples == 0:
         findings = [_empty(required=required)]
     elif captured:
         findings = _captured(quality, samples, limits, required=required)
+    elif own:  # whether there are values is in every tick
+        findings = _findings(_certainty(quality, limits))
     else:
         findings = judge_quality(quality, header.rate_hz, samples, limits, required=required)
     findings += _findings(_noted(recorded), _unwritten(recorded))
     unknown = unknowable(quality) if _probed_in_full(recorded) else UNWRITTEN
-    if captured:
+    if own:
         unknown = "the lag of its device, beyond what is declared"
     return StreamReport(
         header.name,
