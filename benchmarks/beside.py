@@ -99,10 +99,10 @@ def clients(folder: Path, count: int) -> list[Row]:
     what = "99 % of ticks late by at most, with rude clients, ms"
     reference = "without, and a quarter of a tick"
     return [
-        Row("beside", what, usual["rude"], usual["quiet"] + QUARTER_MS, reference, 1.0),
+        Row("beside", what, usual["rude"], usual["quiet"] + QUARTER_MS, reference, 0.6),
         Row(
             "beside", "the session's share of a core, with rude clients", share["rude"],
-            share["quiet"], "without", 1.5,
+            share["quiet"], "without", 1.25,
         ),
     ]  # fmt: skip
 
@@ -138,7 +138,7 @@ def laboratory(folder: Path, length: int) -> Row:
         devices.communicate()
     what = "99 % of ticks late by at most, while 64 channels at 1 kHz are recorded, ms"
     bare = usual["P002"] + QUARTER_MS
-    return Row("beside", what, usual["P001"], bare, "without, and a quarter of a tick", 1.0)
+    return Row("beside", what, usual["P001"], bare, "without, and a quarter of a tick", 0.6)
 
 
 def sound(folder: Path, length: float) -> Row:

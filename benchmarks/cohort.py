@@ -89,7 +89,7 @@ def one_core(folder: Path, participants: int) -> list[Row]:
         ticks += count
         for passes in PASSES:
             bare[passes] += bare_s(study, passes, count // PART) * count / (count // PART)
-    whole = {200: 0.6, 400: 0.6}
+    whole = {200: 0.52, 400: 0.31}
     made = f"{participants} participants, {stepping.ticks} ticks by kernels, us per tick"
     return [
         *(
@@ -109,7 +109,7 @@ def one_core(folder: Path, participants: int) -> list[Row]:
             1e6 * stepping.seconds / stepping.ticks,
             1e6 * bare[200] / ticks,
             "bare PyBullet, 200 passes",
-            0.1,
+            0.09,
         ),
     ]
 
@@ -172,7 +172,7 @@ def two_cores_and_memory(folder: Path, few: int, many: int) -> Iterator[Row]:
     apart = max(each.seconds for each in halves)
     yield Row("cohort", what, two, apart, f"two commands at once, {few} each", TWO_TIMES)
     small = halves[0].megabytes
-    yield Row("cohort", f"{many} participants, MB at most", large, small, f"{few} of them", 1.1)
+    yield Row("cohort", f"{many} participants, MB at most", large, small, f"{few} of them", 1.15)
 
 
 def pilot(folder: Path, participants: int) -> Row:

@@ -100,9 +100,9 @@ def rows_of(minutes: float) -> list[Row]:
         Row("length", f"{size}: recover, MB at most", recovered[1], 200.0, promised, 1.0),
         Row("length", f"{size}: open and read a column, s", ours[0], 0.3, promised, 1.0),
         Row("length", f"{size}: open and read a column, MB", ours[1], 100.0, promised, 1.0),
-        Row("length", f"{size}: read a column, s", ours[0], bare[0], "h5py alone", 2.5),
-        Row("length", f"{size}: export, s", exported[0], plain[0], "h5py to pyarrow", 10.0),
-        Row("length", f"{size}: export, MB at most", exported[1], plain[1], "the same", 0.5),
+        Row("length", f"{size}: read a column, s", ours[0], bare[0], "h5py alone", 2.2),
+        Row("length", f"{size}: export, s", exported[0], plain[0], "h5py to pyarrow", 1.1),
+        Row("length", f"{size}: export, MB at most", exported[1], plain[1], "the same", 0.26),
     ]
 
 

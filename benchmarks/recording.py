@@ -136,7 +136,7 @@ def consolidation(
     print(f"h5py alone, no filters                    {bare:6.2f} s {size / bare:7.0f} MB/s")
     print(f"    ratio {ours / same:.2f} to h5py with the same filters")
     if found is not None:
-        found.append(Row("recording", "consolidation, s", ours, same, "h5py, same filters", 2.0))
+        found.append(Row("recording", "consolidation, s", ours, same, "h5py, same filters", 1.25))
     print(f"    file {(folder / 'P001.h5').stat().st_size / 1e6:.0f} MB")
     read = timed(lambda: open_recording(folder / "P001.h5").session(1).streams["state"].data)
     print(f"open_recording, all state columns         {read:6.2f} s {size / read:7.0f} MB/s")
@@ -151,7 +151,7 @@ def loading(journal: Path, found: list[Row] | None = None) -> None:
     print(f"pyxdf.load_xdf                            {theirs:6.2f} s")
     print(f"    ratio {theirs / ours:.1f}")
     if found is not None:
-        found.append(Row("recording", "reading a journal, s", ours, theirs, "pyxdf", 0.25))
+        found.append(Row("recording", "reading a journal, s", ours, theirs, "pyxdf", 0.17))
 
 
 def main() -> None:

@@ -63,8 +63,8 @@ class Results:
         now = {}
         for row in rows:
             key = subject, row.what, row.reference
-            ratio = f"{row.ratio:.2f}" if row.ratio >= 0.01 else f"{row.ratio:.1g}"
-            cell = f"{ratio} ({row.ours:.3g} / {row.bare:.3g}, {datetime.now(UTC).date()})"
+            measured = f"{row.ours:.3g} / {row.bare:.3g}, {datetime.now(UTC).date()}"
+            cell = f"{_short(row.ratio)} ({measured})"
             others = self.figures[key].cells if key in self.figures else {}
             now[key] = Figure(row.limit, {**others, machine(): cell})
         kept = {key: each for key, each in self.figures.items() if key[0] != subject}
@@ -87,7 +87,7 @@ class Results:
         computers = dict.fromkeys(each for row in self.figures.values() for each in row.cells)
         head = [*HEAD, *computers]
         rows = [
-            [*key, f"{self.figures[key].limit:.2f}"]
+            [*key, _short(self.figures[key].limit)]
             + [self.figures[key].cells.get(computer, "") for computer in computers]
             for subject in subjects
             for key in self.figures
@@ -95,6 +95,10 @@ class Results:
         ]
         lines = "".join(f"| {' | '.join(row)} |\n" for row in [head, ["---"] * len(head), *rows])
         return f"{about()}{lines.replace('| --- ', '|---').replace('|--- |', '|---|')}"
+
+
+def _short(ratio: float) -> str:
+    return f"{ratio:.2f}" if ratio >= 0.01 else f"{ratio:.1g}"
 
 
 def about() -> str:

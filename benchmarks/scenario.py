@@ -43,7 +43,7 @@ TICKS = {"kinematic": 4800, "casualty": 7200, "carry": 4800, "reach_over": 4800}
 PICTURES = 10
 SIZE = (960, 540)
 
-LIMITS = {"casualty": 60.0, "carry": 25.0, "reach_over": 25.0}
+LIMITS = {"casualty": 55.0, "carry": 21.0, "reach_over": 15.0}
 """How much longer than a tick of the kinematic study one of a scenario may take, in the median.
 
 The engine's objects need more of the processor's cache than that study: on one computer, the ratio
@@ -52,7 +52,7 @@ of the casualty was 28 and 40, depending on what its neighbours did."""
 HELD = 0.8
 """Share of a tick's length that 99 % of ticks may take: the rate is held, with room."""
 
-PICTURE = 2.0
+PICTURE = 1.65
 """How much longer a picture of a scenario may take than one of the kinematic study."""
 
 SCENARIO = """\

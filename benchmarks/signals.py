@@ -18,17 +18,19 @@ from labcrane.monitoring.monitored_stream import MonitoredStream
 
 RATE_HZ, CHANNELS, SECONDS, ROUNDS = 1000, 64, 20, 5
 CHUNK = 20
-SHARE = 0.02
+SHARE = 0.006
 """Of a core, at most."""
 
 
-def cost(builder: MonitorBuilder, kind: str, unit: str, seconds: int) -> float:
+def cost(
+    builder: MonitorBuilder, kind: str, unit: str, seconds: int, channels: int = CHANNELS
+) -> float:
     """Return the processor's time for a second of a stream, in seconds."""
     rng = np.random.default_rng(1)
     shared = np.cumsum(rng.standard_normal((RATE_HZ * seconds, 1)), axis=0)
-    samples = 0.3 * shared + 5.0 * rng.standard_normal((RATE_HZ * seconds, CHANNELS))
-    channels = tuple(SignalChannel(f"E{at}", unit) for at in range(CHANNELS))
-    stream = SignalStream("Amplifier", kind, float(RATE_HZ), channels)
+    samples = 0.3 * shared + 5.0 * rng.standard_normal((RATE_HZ * seconds, channels))
+    labels = tuple(SignalChannel(f"E{at}", unit) for at in range(channels))
+    stream = SignalStream("Amplifier", kind, float(RATE_HZ), labels)
     times = np.arange(len(samples)) / RATE_HZ
     best = float("inf")
     for _ in range(ROUNDS):

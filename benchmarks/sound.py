@@ -37,8 +37,8 @@ def rows(*, brief: bool = False) -> list[Row]:
     second = 1e-6 * each * settings.rate_hz / settings.block
     least = "pyo's block with the same set"
     return [
-        Row("sound", "a block of 256 with a change, us", each, float(np.median(bare)), least, 2.5),
-        Row("sound", "a second of sound made offline, s", second, 1.0, "the second", 0.05),
+        Row("sound", "a block of 256 with a change, us", each, float(np.median(bare)), least, 2.0),
+        Row("sound", "a second of sound made offline, s", second, 1.0, "the second", 0.01),
         Row("sound", "blocks until a change is heard", heard_after + 1.0, 1.0, "the next", 1.0),
     ]
 

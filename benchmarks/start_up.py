@@ -31,14 +31,14 @@ CASES = {
     "labcrane check": ["-m", "labcrane", "check", str(AIMING)],
 }
 LIMITS = {
-    "labcrane --help": ("import typer, rich", 2.2),
+    "labcrane --help": ("import typer, rich", 1.85),
     "labcrane check": ("import typer, rich, pydantic, ruamel.yaml", 2.2),
 }
 """The reference of each, and how much longer it may take."""
 
 REHEARSAL = ["-m", "labcrane", "check", str(AIMING), "--rehearse"]
 REHEARSALS = 3
-PATIENCE_S = 15.0
+PATIENCE_S = 8.0
 """Longest acceptable wait for a rehearsal of the aiming study."""
 
 

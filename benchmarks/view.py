@@ -28,7 +28,7 @@ ROUNDS, PICTURES = 7, 20
 PROMISED = 30.0
 """Pictures a second, with terrain and the crane's shadow, without a graphics card."""
 
-LIMITS = {"auto": (1.3, 1.4), "software": (2.0, 2.5)}
+LIMITS = {"auto": (1.3, 1.4), "software": (1.6, 1.9)}
 """How much longer a picture may take than the bare scene, and one that is sent than another."""
 
 

@@ -197,9 +197,9 @@ def looked(file: Path, browser: object) -> Looked:
         while not browser.execute_script(LAST):
             time.sleep(0.01)
         opened = time.perf_counter() - began
+        browser.set_script_timeout(120)
         for channel in range(KEPT + 1):  # fills the cache: each further read replaces one
             curves(browser, channel)
-        browser.set_script_timeout(120)
         draw, process = random.Random(23), psutil.Process(viewer.pid)
         jump(browser, film, 0.0)
         before, began_s = process.memory_info().rss / 1e6, sum(process.cpu_times()[:2])

@@ -251,3 +251,21 @@ def test_what_has_become_slower_since_a_commit_is_named(
     said = capsys.readouterr().out
     assert "step: a: only before, not compared" in said
     assert "step: c: only now, not compared" in said
+
+
+def test_a_scale_goes_on_along_its_line_and_says_how_far_it_bends() -> None:
+    scale = importlib.import_module("benchmarks.scale")
+    laws = {"s": lambda n: 2.0 + 0.5 * n, "MB": lambda n: 3.0 + n**2, "files": lambda _: 7.0}
+    grown = scale.Scale(
+        "a report", "people", (10, 20, 30), (100,), lambda n: {u: f(n) for u, f in laws.items()}
+    )
+    _, _, *rows = (line.strip("|").split(" | ") for line in scale.lines([grown]))
+    assert rows[0][2:] == ["7, 12, 17 s", "52 s for 100", "1.00 "]
+    assert rows[1][4] == f"{500 / 300:.2f} "
+    assert rows[2][4] == "none grows "
+
+
+@pytest.mark.slow
+def test_a_stream_of_more_channels_takes_longer() -> None:
+    streamed = importlib.import_module("benchmarks.scale").streamed
+    assert 0.0 < streamed(8)["s"] < streamed(256)["s"] < 1.0
