@@ -39,7 +39,7 @@ class Window:
     def take(self, times: FloatArray, samples: FloatArray) -> bool:
         """Take the next samples; return whether the window has been filled.
 
-        It begins anew where times go back: the source's clock was set.
+        It begins again where times go back: the source's clock was set.
         """
         if np.isnan(self._began) or (len(self.times) and times[0] < self.times[-1]):
             self.times, self.samples = self.times[:0], self.samples[:0]
