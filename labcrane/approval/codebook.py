@@ -5,12 +5,12 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
+from labcrane.core.by_estimate import OF_ESTIMATE
 from labcrane.core.records import Value
 from labcrane.core.signals import Layout, Signal
 from labcrane.design.plan import plan_session
 from labcrane.files.pseudonyms import pseudonyms
 from labcrane.protocol.design import CONDITION
-from labcrane.protocol.estimated import OF_ESTIMATE
 from labcrane.protocol.protocol import ASSIST
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import ESTIMATES, Study

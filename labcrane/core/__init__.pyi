@@ -1,6 +1,7 @@
 """The public names of this package, and the modules from which they are imported."""
 
 from . import compiled, kernel
+from .by_estimate import ByEstimate, Following
 from .cranes.crane import Crane
 from .cranes.crane_settings import CraneSettings, GrappleSettings, LoadedCraneSettings
 from .cranes.load import LoadedCrane
@@ -70,6 +71,7 @@ __all__ = [
     "AtMost",
     "AxisName",
     "ButtonName",
+    "ByEstimate",
     "CameraImage",
     "CameraName",
     "CaptureSettings",
@@ -85,6 +87,7 @@ __all__ = [
     "EventName",
     "Eye",
     "Finding",
+    "Following",
     "GrappleSettings",
     "InputAxis",
     "Item",

@@ -101,6 +101,9 @@ SignalName = Annotated[str, Reference("signal")]
 EventName = Annotated[str, Reference("event")]
 """An event of the session or of a task: ``trial.start``."""
 
+EstimateValue = Annotated[str, Reference("estimate")]
+"""A value of an estimate of the protocol: ``load.ratio``."""
+
 SceneObject = Annotated[str, Reference("object")]
 """A visible object: the tip, a link, a target, the shape of a cue, an object of a scene."""
 

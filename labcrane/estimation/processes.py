@@ -4,9 +4,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from labcrane.core.by_estimate import OF_ESTIMATE
 from labcrane.estimation.config import EstimateConfig
 from labcrane.processes.handle import Patience, ProcessHandle
-from labcrane.protocol.estimated import OF_ESTIMATE
 from labcrane.recording.own_streams import ESTIMATED
 from labcrane.session.visit import Visit
 from labcrane.streams.outlets import source_id

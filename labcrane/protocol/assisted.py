@@ -11,14 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from labcrane.core.by_estimate import ByEstimate, Following
 from labcrane.core.clock import Tick
 from labcrane.core.primitives import Sphere
 from labcrane.core.records import Frame, Run, Trial, Value
 from labcrane.core.roles import Controller, InputDevice
 from labcrane.core.signals import Layout, signals_of
 from labcrane.errors import ProtocolError
-from labcrane.protocol.estimated import OF_ESTIMATE
-from labcrane.protocol.protocol import ASSIST, Assist, ShareByEstimate
+from labcrane.protocol.protocol import ASSIST, Assist
 from labcrane.types import FloatArray
 
 OF_ASSISTANT = f"{ASSIST}."
@@ -119,24 +119,22 @@ class Assisted(Controller):
             ]
         )
         self._out = np.zeros(Layout("the scheme", self.signals).size)
-        self._by = assist.share if isinstance(assist.share, ShareByEstimate) else None
-        self._share = self._by.to[0] if self._by else 0.0
-        self._estimate, self._step = 0, 0.0
+        self._adaptive = isinstance(assist.share, ByEstimate)
+        self._share = Following(0.0 if isinstance(assist.share, dict) else assist.share)
 
     def open(self, run: Run) -> None:
         operators, assistants = _each_ones(run.axes)
         self._axes = operators.size
         takeover = self._assist.takeover
         self._takeover = operators.index(takeover) if takeover else None
-        if self._by:
-            self._estimate = operators.index(OF_ESTIMATE + self._by.estimate)
-            self._step = self._by.at_most_per_s / run.rate_hz
+        self._share.open(operators)
+        self._tick_s = 1.0 / run.rate_hz
         self._scheme.open(replace(run, axes=operators))
         self._second.open(replace(run, axes=assistants))
 
     def begin_trial(self, trial: Trial) -> None:
-        if not self._by:
-            self._share = self._assist.share_in(trial)
+        if not self._adaptive:
+            self._share = Following(self._assist.share_in(trial))
         self._scheme.begin_trial(trial)
         self._second.begin_trial(trial)
 
@@ -154,11 +152,9 @@ class Assisted(Controller):
     def command(self, axes: FloatArray, state: FloatArray) -> FloatArray:
         own = self._scheme.command(axes[: self._axes], state)
         theirs = self._second.command(axes[self._axes :], state)
-        if self._by:
-            change = self._by.at(float(axes[self._estimate])) - self._share
-            self._share += min(max(change, -self._step), self._step)
+        share = self._share.after(self._tick_s, axes)
         pressed = self._takeover is not None and axes[self._takeover] > PRESSED
-        return self._logged(own, 0.0 if pressed else self._share, theirs)
+        return self._logged(own, 0.0 if pressed else share, theirs)
 
     def idle(self) -> FloatArray:
         return self._logged(self._scheme.idle(), 0.0, self._second.idle()).copy()

@@ -11,6 +11,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from labcrane.core.by_estimate import OF_ESTIMATE
 from labcrane.core.clock import Tick
 from labcrane.core.records import Frame, Phase, Run, Trial, TrialStatus, Value
 from labcrane.core.roles import InputDevice, SecondaryTask
@@ -18,9 +19,6 @@ from labcrane.core.settings import EstimateSettings
 from labcrane.core.signals import Layout, Signal
 from labcrane.recording.own_streams import ESTIMATED
 from labcrane.types import FloatArray
-
-OF_ESTIMATE = "estimate."
-"""How the names of the columns begin: ``estimate.load.ratio``."""
 
 MOST_A_TICK = 64
 

@@ -10,25 +10,23 @@ from pydantic import (
     AfterValidator,
     ConfigDict,
     Field,
-    FiniteFloat,
     GetJsonSchemaHandler,
     PositiveFloat,
     PositiveInt,
     ValidationInfo,
     create_model,
     field_validator,
-    model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from labcrane.analysis.presented import PresentedLimits
 from labcrane.analysis.scoring.settings import IndicatorSettings
+from labcrane.core.by_estimate import ByEstimate, Part
 from labcrane.core.records import Trial
 from labcrane.core.references import ButtonName
-from labcrane.core.settings import WrongKey
 from labcrane.core.signals import Signal
-from labcrane.files.model import AtMost, Usual, was_run
+from labcrane.files.model import AtMost, was_run
 from labcrane.files.names import misfit
 from labcrane.files.yaml import YamlFile
 from labcrane.protocol.design import Design, FactorName
@@ -65,41 +63,8 @@ class Use(Section):
 
 DEFAULT_OPERATOR = Use(use="simulated_operator")
 
-SharePart = Annotated[float, Field(ge=0.0, le=1.0)]
 ASSIST = "assist"
 """Factor of a track that chooses the assistant's share, and the column of what it chose."""
-
-
-class ShareByEstimate(Section):
-    """A share that follows the value of an estimate, within limits."""
-
-    estimate: str
-    """The estimate and its value: ``load.ratio``."""
-
-    between: tuple[FiniteFloat, FiniteFloat]
-    """Two different values of the estimate."""
-
-    to: tuple[SharePart, SharePart]
-    """The shares at these values; linear between them, and constant beyond."""
-
-    at_most_per_s: Annotated[PositiveFloat, Usual(0.005, 20.0)]
-    """Maximum change of the share, per second. It begins a session, or its continuation, with the
-    first of the two shares."""
-
-    @model_validator(mode="after")
-    def _maps(self) -> "ShareByEstimate":
-        if self.between[0] == self.between[1]:
-            raise WrongKey(
-                f"between has {self.between[0]:g} twice; give two different values",
-                at=("between",),
-            )
-        return self
-
-    def at(self, value: float) -> float:
-        """Return the share at a value of the estimate."""
-        first, last = self.between
-        part = min(max((value - first) / (last - first), 0.0), 1.0)
-        return self.to[0] + part * (self.to[1] - self.to[0])
 
 
 class Assist(Use):
@@ -109,7 +74,7 @@ class Assist(Use):
     assistant's. Then the machine's limits act.
     """
 
-    share: SharePart | Annotated[dict[FactorName, SharePart], Field(min_length=1)] | ShareByEstimate
+    share: Part | Annotated[dict[FactorName, Part], Field(min_length=1)] | ByEstimate
     """The assistant's share of the command in every trial, 0 to 1; or shares by name, which
     groups, conditions and blocks switch on as they do feedback: ``{half: 0.5, full: 1}``. A trial
     with none of them on has the share 0. A track with ``factor: assist`` chooses among them. Or a
@@ -134,7 +99,7 @@ class Assist(Use):
 
     def share_in(self, trial: Trial) -> float:
         """Return the assistant's share in a trial; of one that follows an estimate the first."""
-        if isinstance(self.share, ShareByEstimate):
+        if isinstance(self.share, ByEstimate):
             return self.share.to[0]
         if not isinstance(self.share, dict):
             return self.share

@@ -10,7 +10,7 @@ from pathlib import Path
 from labcrane.core.events import OF_SESSION
 from labcrane.core.references import Covers, Mentioned, Once, Reference, mentioned
 from labcrane.core.roles import Component, Task
-from labcrane.core.settings import Settings
+from labcrane.core.settings import EstimateSettings, Settings
 from labcrane.errors import LabcraneError, nearest
 from labcrane.files.names import absent, outside
 from labcrane.files.system import is_file, is_there
@@ -33,6 +33,7 @@ OWNERS: Mapping[str, str] = {
     "signal": "the study",
     "event": "the study",
     "object": "the picture",
+    "estimate": "the study",
     "view": "the protocol",
 }
 """Owners of the names of a kind, for messages; other kinds belong to the study."""
@@ -302,7 +303,8 @@ class ReferenceChecker:
         """Return the names of a kind; those of the input are the operator's for the operator."""
         key = f"operator {kind}" if place[0] == "operator" and kind == "axis" else kind
         if key not in self._known:
-            self._known[key] = self._found(kind, "operator" if key != kind else "input")
+            device = "operator" if key != kind else "input"
+            self._known[key] = self._values() if kind == "estimate" else self._found(kind, device)
         return self._known[key]
 
     def _found(self, kind: str, device: str) -> Known:
@@ -332,6 +334,16 @@ class ReferenceChecker:
             given = self._of([("dynamics",), *self._places("tasks", "feedback", "views")], kind)
             return None if given is None else given | {*self._machine.names, "foot"}
         return self._of(list(self._components), kind)
+
+    def _values(self) -> Known:
+        """Return the values of the estimates; None unless all of them could be read."""
+        found: set[str] = set()
+        for place in self._places("estimates"):
+            choice = self._components.get(place)
+            if choice is None or not isinstance(choice.settings, EstimateSettings):
+                return None
+            found |= {f"{place[1]}.{value}" for value in choice.settings.values}
+        return frozenset(found)
 
     @cached_property
     def _all_tasks(self) -> bool:

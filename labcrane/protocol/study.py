@@ -31,7 +31,6 @@ from labcrane.protocol.protocol import (
     DEFAULT_OPERATOR,
     OF_ASSIST,
     Protocol,
-    ShareByEstimate,
     read,
 )
 from labcrane.protocol.references import Parts, ReferenceChecker, twice
@@ -577,7 +576,7 @@ def _check_estimates(
     estimates: Mapping[str, EstimateSettings],
     taken: Container[str],
 ) -> None:
-    """Note estimates with a name that is taken or wrong, without a stream, or that are missing."""
+    """Note estimates with a name that is taken or wrong, or without a stream."""
     single = [label for label, each in protocol.streams.items() if not each.several]
     for name, settings in estimates.items():
         if not name.isidentifier():
@@ -593,12 +592,6 @@ def _check_estimates(
             there = nearest(settings.stream, single, "streams has")
             message = f"there is no single stream {settings.stream!r} under streams; {there}"
             source.problem(("estimates", name, "stream"), message)
-    share = protocol.assist.share if protocol.assist else None
-    known = [f"{name}.{value}" for name, each in estimates.items() for value in each.values]
-    if isinstance(share, ShareByEstimate) and share.estimate not in known:
-        there = nearest(share.estimate, known, "estimates gives")
-        message = f"there is no estimate {share.estimate!r}; {there}"
-        source.problem((ASSIST, "share", "estimate"), message)
 
 
 def _with_beside(

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Mapping
 
+from labcrane.core.by_estimate import OF_ESTIMATE
 from labcrane.core.records import Event, Frame
 from labcrane.core.settings import EstimateSettings
 from labcrane.core.signals import Layout
-from labcrane.protocol.estimated import OF_ESTIMATE, WORDS, State
+from labcrane.protocol.estimated import WORDS, State
 from labcrane.recording.frame_log import FrameLog
 from labcrane.session.commands import Console
 

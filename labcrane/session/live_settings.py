@@ -5,6 +5,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from labcrane.core.by_estimate import ByEstimate
 from labcrane.core.records import Value
 from labcrane.core.settings import Settings
 from labcrane.errors import ProtocolError
@@ -45,6 +46,9 @@ class FeedbackSettings:
         fields = type(before).model_fields
         if key not in fields:
             raise ValueError(f"{name} has no setting {key!r}; it has {', '.join(fields)}")
+        if isinstance(getattr(before, key), ByEstimate):
+            message = f"{name}.{key} follows an estimate, and cannot be set by hand"
+            raise ValueError(message)  # noqa: TRY004 - what people wrote, like the rest
         try:
             value = parse_yaml(written, "a setting")
         except ProtocolError:

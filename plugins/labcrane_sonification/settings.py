@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from labcrane import Machine, Settings
-from labcrane.core import Names, SignalName, Unit, Within, WrongKey, was_run
+from labcrane.core import ByEstimate, Names, SignalName, Unit, Within, WrongKey, was_run
 
 MOST_OVERTONES = 15
 LOWEST_HZ, HIGHEST_HZ = 40.0, 10_000.0
@@ -58,6 +58,9 @@ class SonificationSettings(Settings):
     weighting: Literal["a", "none"] = "a"
     """``a`` lowers the amplitude at pitches to which the ear is more sensitive, so that the same
     ``level`` is equally loud at every distance, in dB(A); ``none`` keeps the amplitude."""
+
+    loudness: Annotated[float, Field(ge=0.0, le=1.0)] | ByEstimate = 1.0
+    """Factor of ``level``, 0 to 1. Or one that follows an estimate."""
 
     aside: Annotated[PositiveFloat, Unit("m")] = 2.0
     """Lateral distance, in metres, at which the tone comes from one side only."""

@@ -3,6 +3,7 @@
 import math
 import wave
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from pydantic import BaseModel
 
 from labcrane import Feedback, FloatArray, Frame, Run, Signal
-from labcrane.core import SessionState, Value
+from labcrane.core import ByEstimate, Following, SessionState, Value
 from labcrane_sonification import real_time
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.synth import Synth, offline_server, server
@@ -21,7 +22,7 @@ from labcrane_sonification.underruns import Underruns
 Maker = Callable[[SonificationSettings], Any]
 """Makes a sound server."""
 
-LIVE = ("far", "pitch_hz", "level", "aside", "pan", "silent_after_s", "ramp_s")
+LIVE = ("far", "pitch_hz", "level", "loudness", "aside", "pan", "silent_after_s", "ramp_s")
 """Settings that can change while the sound server runs: a server that is closed and opened again is
 silent for seconds."""
 
@@ -35,7 +36,7 @@ class Sonification(Feedback):
         Makes the sound server; offline rendering gives another one.
     """
 
-    signals = (
+    signals: tuple[Signal, ...] = (
         Signal("tone.pitch", "Hz"),
         Signal("tone.overtones", "1"),
         Signal("tone.level", "1"),
@@ -46,6 +47,8 @@ class Sonification(Feedback):
 
     def __init__(self, settings: SonificationSettings, make_server: Maker = server) -> None:
         self._settings = settings
+        self._loudness = Following(settings.loudness)
+        self.signals = (*self.signals, *self._loudness.signals("tone.loudness"))
         self._make_server = make_server
         self._synth: Synth | None = None
         self._underruns: Underruns | None = None
@@ -66,6 +69,7 @@ class Sonification(Feedback):
         self._radius = run.task.find("target.radius")
         stimulus = self._settings.stimulus
         self._stimulus = None if stimulus is None else run.task.index(stimulus)
+        self._loudness.open(run.axes)
         made, by_jack = self._make_server(self._settings), self._settings.driver == "jack"
         live = by_jack and self._make_server is server
         self._scheduling = real_time.follow() if live else "ordinary"
@@ -90,6 +94,8 @@ class Sonification(Feedback):
         if before != now:
             return False
         self._settings = settings
+        if not isinstance(settings.loudness, ByEstimate):
+            self._loudness = Following(settings.loudness)
         self._synth.ramp(settings.ramp_s)
         return True
 
@@ -98,12 +104,13 @@ class Sonification(Feedback):
             self._trial, self._entered = situation.trial, None
 
     def present(self, frame: Frame) -> FloatArray:
-        now = self.tone(frame)
+        now, loudness = self.tone(frame), self._loudness.shown(frame)
         if now is None:
             self.idle()
-            return np.array([math.nan, math.nan, 0.0, math.nan, *self._counts()])
+            return np.array([math.nan, math.nan, 0.0, math.nan, *self._beside()])
+        now = replace(now, level=loudness * now.level)
         self.synth.sound(now)
-        return np.array([*now.values, *self._counts()])
+        return np.array([*now.values, *self._beside()])
 
     def tone(self, frame: Frame) -> Tone | None:
         """Return the tone for a frame that follows those presented; None without a target."""
@@ -162,10 +169,11 @@ class Sonification(Feedback):
             "delay": "not measured",
         }
 
-    def _counts(self) -> tuple[float, float]:
-        """Return how many samples were made, and how many blocks were missed."""
+    def _beside(self) -> tuple[float, ...]:
+        """Return how many samples were made, how many blocks were missed, and the loudness."""
         missed = math.nan if self._underruns is None else float(self._underruns.missed)
-        return float(self.synth.server.getCurrentTimeInSamples()), missed
+        made = float(self.synth.server.getCurrentTimeInSamples())
+        return made, missed, *self._loudness.recorded
 
 
 def write_wav(path: Path, sound: npt.NDArray[np.float32], rate_hz: int) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from labcrane import Machine, Settings
-from labcrane.core import Names, Unit, Within, WrongKey
+from labcrane.core import ByEstimate, Names, Unit, Within, WrongKey
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -45,8 +45,8 @@ class SphereSettings(Settings):
     colour: tuple[Share, Share, Share] = (0.15, 0.75, 1.0)
     """Red, green and blue at full brightness, each 0 to 1."""
 
-    opacity: float = Field(default=0.45, gt=0.0, le=1.0)
-    """Opacity; 1 hides everything behind the sphere."""
+    opacity: Annotated[float, Field(gt=0.0, le=1.0)] | ByEstimate = 0.45
+    """Opacity; 1 hides everything behind the sphere. Or an opacity that follows an estimate."""
 
     def reveals(self) -> tuple[Within, ...]:
         if self._is_constant:

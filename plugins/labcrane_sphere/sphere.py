@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from labcrane import Cue, FloatArray, Frame, Run, Signal
-from labcrane.core import Shape, Sphere
+from labcrane.core import Following, Shape, Sphere
 from labcrane_sphere.settings import SphereSettings
 
 STEEPNESS = 9.0
@@ -16,27 +16,35 @@ STEEPNESS = 9.0
 class SphereCue(Cue):
     """Radius and brightness are functions of the distance alone."""
 
-    signals = (Signal("distance", "m"), Signal("radius", "m"), Signal("brightness", "1"))
+    signals: tuple[Signal, ...] = (
+        Signal("distance", "m"),
+        Signal("radius", "m"),
+        Signal("brightness", "1"),
+    )
 
     def __init__(self, settings: SphereSettings) -> None:
         self._settings = settings
+        self._opacity = Following(settings.opacity)
+        self.signals = (*self.signals, *self._opacity.signals("opacity"))
 
     def open(self, run: Run) -> None:
         self._tip = run.state.find("tip.position")
         self._target = run.task.find("target.position")
+        self._opacity.open(run.axes)
 
     def draw(self, frame: Frame) -> Sequence[Shape]:
-        distance, radius, brightness = self.values(frame).tolist()
+        distance, radius, brightness = self.values(frame)[:3].tolist()
         if math.isnan(distance):
             return ()
         place = frame.task[self._target] if self._settings.at == "target" else None
         x, y, z = (frame.state[self._tip] if place is None else place).tolist()
         red, green, blue = (brightness * part for part in self._settings.colour)
-        return (Sphere("sphere", (x, y, z), radius, (red, green, blue, self._settings.opacity)),)
+        return (Sphere("sphere", (x, y, z), radius, (red, green, blue, self._opacity.value)),)
 
     def values(self, frame: Frame) -> FloatArray:
         distance = float(np.linalg.norm(frame.task[self._target] - frame.state[self._tip]))
-        return np.array([distance, *self.look(distance)])
+        self._opacity.shown(frame)
+        return np.array([distance, *self.look(distance), *self._opacity.recorded])
 
     def look(self, distance: float) -> tuple[float, float]:
         """Return radius in metres and brightness at a distance in metres; NaN at NaN."""

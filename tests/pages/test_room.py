@@ -324,6 +324,16 @@ def test_whatever_a_slider_can_say_the_session_takes_or_refuses_in_words(setting
     assert taken > 20
 
 
+def test_an_opacity_is_a_slider_to_its_bounds_unless_it_follows_an_estimate() -> None:
+    (opacity,) = (one for one in sliders("b", SphereSettings(), {}) if one["key"] == "opacity")
+    assert (opacity["low"] > 0.0, opacity["high"]) == (True, 1.0)
+    law = {"estimate": "load.ratio", "between": [1, 3], "to": [0.2, 0.8], "at_most_per_s": 0.4}
+    settings = SphereSettings(opacity=law)
+    assert not [one for one in sliders("b", settings, {}) if one["key"] == "opacity"]
+    why = FeedbackSettings({"b": Chosen(settings)}).refusal(SettingChange("b", "opacity", "0.5"))
+    assert why == "b.opacity follows an estimate, and cannot be set by hand"
+
+
 def test_a_slider_stands_at_what_was_changed_and_knows_what_the_protocol_says() -> None:
     (far,) = (one for one in sliders("b", SphereSettings(), {"far": 3.0}) if one["key"] == "far")
     assert (far["now"], far["protocol"], far["unit"]) == (3.0, 4.0, "m")

@@ -12,7 +12,7 @@ from needs import needs
 from programs import ran
 from pydantic import ValidationError
 
-from labcrane import Feedback, Frame
+from labcrane import Feedback, Frame, Signal
 from labcrane.testing import TARGETS, FeedbackContract, ch8, make_run, make_target, opened
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.sonification import Sonification
@@ -111,6 +111,24 @@ def test_laws_change_while_the_server_runs_and_its_own_settings_do_not() -> None
         assert narrow[3] == -wide[3] != 0.0
         for other in ({"block": 512}, {"driver": "jack"}, {"overtones": (0, 9)}):
             assert not sonification.adjust(SonificationSettings(far=9.0, **other))
+
+
+def test_its_loudness_follows_an_estimate_as_a_factor_of_the_level() -> None:
+    law = {"estimate": "load.ratio", "between": [1, 3], "to": [1, 0.5], "at_most_per_s": 0.5}
+    run = make_run(ch8(), axes=[Signal("estimate.load.ratio", "")], task=TARGETS)
+    full = Sonification(SonificationSettings(), offline_server)
+    follows = Sonification(SonificationSettings(loudness=law), offline_server)
+    with opened(full, run), opened(follows, run):
+        for elapsed, factor in ((0.0, 1.0), (0.5, 0.75), (2.0, 0.5)):
+            frame = make_target(run)
+            frame.axes[:], frame.elapsed = 4.0, elapsed
+            *_, loudness = shown = follows.present(frame)
+            assert loudness == pytest.approx(factor)
+            assert shown[2] == pytest.approx(factor * full.present(frame)[2])
+        assert follows.adjust(SonificationSettings(loudness=law, far=9.0))
+        assert follows.present(frame)[-1] == pytest.approx(0.5), "it goes on where it was"
+        assert full.adjust(SonificationSettings(loudness=0.2))
+        assert full.present(frame)[2] == pytest.approx(0.4 * shown[2])
 
 
 def test_a_paused_session_is_silent() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 from pydantic import ValidationError
 
-from labcrane import Cue
+from labcrane import Cue, Signal
 from labcrane.testing import TARGETS, CueContract, ch8, make_run, make_target
 from labcrane_sphere.settings import SphereSettings
 from labcrane_sphere.sphere import SphereCue
@@ -60,6 +60,36 @@ def test_it_is_drawn_where_it_should_be(at: str) -> None:
     assert distance == pytest.approx(math.dist(frame.task[:3], frame.state[8:11]))
     assert ball.radius == radius
     np.testing.assert_allclose(ball.colour[:3], brightness * np.array((0.15, 0.75, 1.0)))
+
+
+def test_its_opacity_follows_an_estimate_within_trials_and_never_faster_than_its_limit() -> None:
+    law = {"estimate": "load.ratio", "between": [1, 3], "to": [0.2, 0.8], "at_most_per_s": 0.4}
+    sphere = SphereCue(SphereSettings(opacity=law))
+    run = make_run(ch8(), axes=[Signal("estimate.load.ratio", "")], task=TARGETS)
+    sphere.open(run)
+
+    def opacity(ratio: float, trial: int, elapsed: float) -> float:
+        frame = make_target(run)
+        frame.axes[:], frame.trial, frame.elapsed = ratio, trial, elapsed
+        (ball,) = sphere.draw(frame)
+        assert sphere.values(frame)[3] == ball.colour[3]
+        return ball.colour[3]
+
+    seen = [
+        opacity(*each)
+        for each in (
+            (3.0, 1, 0.0),  # it begins with the first
+            (3.0, 1, 1.0),
+            (3.0, 1, 1.0),  # a pause
+            (3.0, 3, 9.0),  # another trial
+            (3.0, 3, 9.5),
+            (9.0, 3, 11.0),
+            (2.0, 3, 11.5),
+            (2.0, 3, 19.0),
+            (2.0, 3, 0.0),  # another attempt
+        )
+    ]
+    assert seen == pytest.approx([0.2, 0.6, 0.6, 0.6, 0.8, 0.8, 0.6, 0.5, 0.5])
 
 
 def test_sizes_the_wrong_way_round_are_refused() -> None:

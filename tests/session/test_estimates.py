@@ -77,8 +77,9 @@ def scripted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rig, "WithEstimates", lambda *given: WithEstimates(*given[:2], "any"))
 
 
-def test_the_example_has_no_warning() -> None:
-    path = Path(__file__).parents[2] / "examples" / "adaptive_assist" / "protocol.yaml"
+@pytest.mark.parametrize("name", ["adaptive_assist", "adaptive_sphere"])
+def test_the_example_has_no_warning(name: str) -> None:
+    path = Path(__file__).parents[2] / "examples" / name / "protocol.yaml"
     assert list(questions(load(path, discover()))) == []
 
 
@@ -193,9 +194,11 @@ def test_a_replay_reads_the_columns_and_gives_the_same_bits(tmp_path: Path, scri
 
 
 REFUSED = {
-    "there is no estimate 'load.ration'; did you mean 'load.ratio'": text(
+    r"assist.share.estimate is 'load.ration', .* no such estimate; did you mean 'load.ratio'": text(
         SHARE.replace("ratio", "ration")
     ),
+    r"feedback.ball.opacity.estimate is 'lod.ratio', .* did you mean 'load.ratio'": text("1")
+    + f"feedback: {{ball: {{use: sphere, opacity: {SHARE.replace('load', 'lod')}}}}}\n",
     "between has 3 twice": text(SHARE.replace("[1, 3]", "[3, 3]")),
     "less than or equal to 1": text(SHARE.replace("0.8", "1.8")),
     "there is no single stream 'eg' under streams": text().replace("stream: eeg", "stream: eg"),

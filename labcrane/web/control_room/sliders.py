@@ -30,11 +30,13 @@ def sliders(name: str, settings: Settings, changed: Mapping[str, Value]) -> list
     for key, field in type(settings).model_fields.items():
         written = getattr(settings, key)
         now = changed.get(key, written)
-        control = _control(schema.get(key, {}), field, written)
+        said = schema.get(key, {})
+        number = (each for each in said.get("anyOf", ()) if each.get("type") == "number")
+        control = _control(next(number, said), field, written)
         if control is None:
             continue
         unit = unit_of(key, field.metadata) or ""
-        about = str(schema.get(key, {}).get("description", "")).partition("\n")[0]
+        about = str(said.get("description", "")).partition("\n")[0]
         ident = f"{name}-{key}"
         found.append(
             {"ident": ident, "place": f"{name}.{key}", "key": key.replace("_", " "), "now": now,
