@@ -1,7 +1,7 @@
 """The process of one recording: a camera, a microphone or a screen.
 
 It is started by a :class:`labcrane.processes.handle.ProcessHandle` with a
-:class:`labcrane.capture.config.CaptureConfig` and ends when its parent does. Its frames are listed
+:class:`labcrane.session.part.PartConfig` and ends when its parent does. Its frames are listed
 in a stream, which the session's recorders take. It reports the stream (``sends``), the file that
 was begun (``file``), the dropped frames (``missed``, which is its beat as well), and the reason
 for which it ends (``failed``).
@@ -17,16 +17,13 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane.capture.config import CaptureConfig
 from labcrane.core.records import Captured
 from labcrane.core.roles import Capture
 from labcrane.errors import LabcraneError
-from labcrane.processes.parent import Parent
-from labcrane.protocol.study import load
+from labcrane.processes.parent import Parent, serve
 from labcrane.recording.paths import captured_file
-from labcrane.recording.pictures import CHANNELS
-from labcrane.registry.registry import discover
-from labcrane.registry.traceback import told
+from labcrane.recording.pictures import CAPTURED, CHANNELS
+from labcrane.session.part import PartConfig
 from labcrane.streams.outlets import SampleOutlet, channel, check_clock, stream_info
 
 BEAT_S = 0.5
@@ -41,9 +38,9 @@ DELIVERY_S = 0.3
 """How long the recorders are left to begin, and to take what was sent last."""
 
 
-def run(config: CaptureConfig, parent: Parent) -> None:
+def run(config: PartConfig, parent: Parent) -> None:
     """Record until the parent is gone; raises what the recording raises."""
-    study = load(config.study, discover(study=config.study), recorded=config.recorded)
+    study = config.load()
     recording = study.recordings[config.name].build(study.machine)
     assert isinstance(recording, Capture)  # noqa: S101 - an offer of this role
     recording.windows = {name: study.window_title(name) for name in study.protocol.views}
@@ -55,7 +52,7 @@ def run(config: CaptureConfig, parent: Parent) -> None:
         recording.close()
 
 
-def _follow(config: CaptureConfig, parent: Parent, recording: Capture) -> None:
+def _follow(config: PartConfig, parent: Parent, recording: Capture) -> None:
     index = _Index(config, parent)
     settled = math.inf
     while time.monotonic() < settled and not parent.gone.is_set():
@@ -90,9 +87,9 @@ def _leave_room(folder: Path) -> None:
 class _Index:
     """The stream that lists the frames."""
 
-    def __init__(self, config: CaptureConfig, parent: Parent) -> None:
+    def __init__(self, config: PartConfig, parent: Parent) -> None:
         info = stream_info(
-            config.stream,
+            CAPTURED + config.name,
             "Capture",
             len(CHANNELS),
             "double64",
@@ -135,23 +132,5 @@ class _Index:
             self._parent.tell({"missed": self._missed})
 
 
-def main() -> int:
-    """Run one recording's process; return its exit status."""
-    parent = Parent()
-    if (config := parent.order()) is None:
-        return 0
-    try:
-        run(config, parent)
-    except LabcraneError as error:
-        parent.tell({"failed": str(error)})
-        return 1
-    except Exception as error:
-        parent.tell({"failed": told(error)})
-        raise  # a plugin's mistake: its author needs the traceback
-    finally:
-        parent.close()
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(serve(run))

@@ -1,7 +1,7 @@
 """The process of one estimate.
 
 It is started by a :class:`labcrane.processes.handle.ProcessHandle` with a
-:class:`labcrane.estimation.config.EstimateConfig` and ends when its parent does. It is told which
+:class:`labcrane.session.part.PartConfig` and ends when its parent does. It is told which
 stream the recorder has, by the properties of its description, and receives it by an inlet of its
 own. It reports the stream of its values (``sends``), that it lives (``beat``), and the reason for
 which it ends (``failed``).
@@ -17,17 +17,14 @@ import numpy as np
 from labcrane.core.records import Estimated
 from labcrane.core.roles import Estimate
 from labcrane.core.settings import EstimateSettings
-from labcrane.errors import LabcraneError, StreamError
-from labcrane.estimation.config import EstimateConfig
+from labcrane.errors import StreamError
 from labcrane.monitoring.monitored_stream import signal_stream
-from labcrane.processes.parent import Parent
+from labcrane.processes.parent import Parent, serve
 from labcrane.protocol.estimated import State
 from labcrane.protocol.streams import StreamNeed
-from labcrane.protocol.study import load
 from labcrane.recording.own_streams import ESTIMATED, STATED
 from labcrane.recording.xdf.header import StreamHeader
-from labcrane.registry.registry import discover
-from labcrane.registry.traceback import told
+from labcrane.session.part import PartConfig
 from labcrane.streams.newest import NewestSample
 from labcrane.streams.outlets import SampleOutlet, channel, check_clock, stream_info
 from labcrane.streams.probes import Probe
@@ -40,9 +37,9 @@ DRIFT = 1e-4
 """How far a crystal in order drifts beyond what was measured last, as a share of the time."""
 
 
-def run(config: EstimateConfig, parent: Parent) -> None:
+def run(config: PartConfig, parent: Parent) -> None:
     """Estimate until the parent is gone; raises what the estimate raises."""
-    study = load(config.study, discover(study=config.study), recorded=config.recorded)
+    study = config.load()
     choice = study.choices[f"estimates.{config.name}"]
     estimate, settings = choice.build(study.machine), study.estimates[config.name]
     assert isinstance(estimate, Estimate)  # noqa: S101 - an offer of this role
@@ -124,7 +121,7 @@ class _Source:
 class _Outlet:
     """The stream of an estimate: values, first and last sample, and state, at the values' time."""
 
-    def __init__(self, config: EstimateConfig, settings: EstimateSettings) -> None:
+    def __init__(self, config: PartConfig, settings: EstimateSettings) -> None:
         columns = (*settings.values, "first", "last", *STATED, "state")
         self._size = len(settings.values)
         name = ESTIMATED + config.name
@@ -174,23 +171,5 @@ class _Outlet:
         self._outlet.push(np.array([*values, *seen, error_s, state]), stamp)
 
 
-def main() -> int:
-    """Run one estimate's process; return its exit status."""
-    parent = Parent()
-    if (config := parent.order()) is None:
-        return 0
-    try:
-        run(config, parent)
-    except LabcraneError as error:
-        parent.tell({"failed": str(error)})
-        return 1
-    except Exception as error:
-        parent.tell({"failed": told(error)})
-        raise  # a plugin's mistake: its author needs the traceback
-    finally:
-        parent.close()
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(serve(run))

@@ -1,13 +1,13 @@
 """All estimates of a visit: one process each, started again for as long as the session lasts."""
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from labcrane.core.by_estimate import OF_ESTIMATE
-from labcrane.estimation.config import EstimateConfig
-from labcrane.processes.handle import Patience, ProcessHandle
+from labcrane.processes.handle import Patience
+from labcrane.processes.restarted import RestartedProcess
 from labcrane.recording.own_streams import ESTIMATED
+from labcrane.session.part import PartConfig
 from labcrane.session.visit import Visit
 from labcrane.streams.outlets import source_id
 from labcrane.streams.request import StreamRequest
@@ -17,8 +17,7 @@ MODULE = "labcrane.estimation.process"
 START_S, SILENT_S, STOP_S = 60.0, 5.0, 5.0
 """How long a process may take to begin, may be silent then, and may take to end."""
 
-PAUSE_S, LONGEST_PAUSE_S = 1.0, 30.0
-"""Between the end of a process and the start of the next one; each pause is twice the last."""
+LONGEST_PAUSE_S = 30.0
 
 PROPERTIES = {"name": "name", "type": "type", "source_id": "source_id", "hostname": "host"}
 """What a stream is found by, and what the recorder's status calls it."""
@@ -28,16 +27,15 @@ class EstimateProcesses:
     """Starts, watches and stops the estimates of a visit."""
 
     def __init__(self, visit: Visit) -> None:
-        study = visit.study
         self._handles = [
-            _Handle(EstimateConfig(study.path.resolve(), study.recorded, name, visit.source), of)
-            for name, of in ((name, each.stream) for name, each in study.estimates.items())
+            _Handle(PartConfig.of(visit, name), settings.stream)
+            for name, settings in visit.study.estimates.items()
         ]
 
     @property
     def settled(self) -> bool:
         """Whether the stream of each is there, or its process has failed once."""
-        return all(handle.sends or handle.restarts for handle in self._handles)
+        return all(handle.sends or handle.failures for handle in self._handles)
 
     @property
     def sends(self) -> tuple[str, ...]:
@@ -52,8 +50,9 @@ class EstimateProcesses:
             if each["name"]
         }
         for handle in self._handles:
-            if news := handle.watch(taken):
-                say(news)
+            for news in handle.watch():
+                say(f"{handle.name}: {news}")
+            handle.follow(taken)
 
     def stop(self) -> None:
         """Stop all processes."""
@@ -71,41 +70,27 @@ def estimate_requests(visit: Visit) -> list[StreamRequest]:
     ]
 
 
-class _Handle(ProcessHandle):
-    """The process of one estimate, the stream that it receives and the one that it sends."""
+class _Handle(RestartedProcess):
+    """The process of one estimate, and the stream that it receives."""
 
-    def __init__(self, config: EstimateConfig, stream: str) -> None:
-        self._config, self._stream = config, stream
+    def __init__(self, config: PartConfig, stream: str) -> None:
+        self._stream = stream
         self._told: Mapping[str, str] | None = None
-        self._failed = self.sends = ""
-        self._again: float | None = None
-        self._pause_s = PAUSE_S
         patience = Patience(START_S, SILENT_S, STOP_S)
-        super().__init__(MODULE, f"estimate {config.name}", patience, self._hear_of)
-        self.start(config)
+        super().__init__(MODULE, f"estimate {config.name}", patience, config, LONGEST_PAUSE_S)
 
-    def watch(self, taken: Mapping[str, Mapping[str, str]]) -> str:
-        """Start it again some time after it failed; return what is new, in words."""
-        if self._again is not None:
-            if time.monotonic() >= self._again:
-                self._again = None
-                self.start_anew(self._config)
-            return ""
-        if (why := self.failure) is not None:
-            self.kill()
-            self.ready, self._told = False, None
-            self._again = time.monotonic() + self._pause_s
-            self._pause_s = min(2.0 * self._pause_s, LONGEST_PAUSE_S)
-            news = f"{self.name} failed: {self._failed or why}; it is started again"
-            self._failed = self.sends = ""
-            return news
+    def follow(self, taken: Mapping[str, Mapping[str, str]]) -> None:
+        """Tell the present process which stream the recorder has."""
         stream = taken.get(self._stream)
         if stream is not None and stream != self._told:
             self._told = stream
             self.tell(stream)
-        return ""
+
+    def start_anew(self, order: object) -> None:
+        self._told = None
+        super().start_anew(order)
 
     def _hear_of(self, message: Mapping[str, Any]) -> None:
-        self._failed = message.get("failed", self._failed)
-        self.sends = message.get("sends", self.sends)
-        self.ready = self.ready or "beat" in message
+        super()._hear_of(message)
+        if "beat" in message and not self.ready:
+            self._works()

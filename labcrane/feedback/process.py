@@ -13,12 +13,11 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from labcrane.core.records import Frame
-from labcrane.errors import LabcraneError, StreamError
+from labcrane.errors import StreamError
 from labcrane.feedback.config import FeedbackConfig
 from labcrane.feedback.presenter import Presenter
-from labcrane.processes.parent import Parent
+from labcrane.processes.parent import Parent, serve
 from labcrane.registry.registry import discover
-from labcrane.registry.traceback import told
 
 if TYPE_CHECKING:
     import pylsl
@@ -174,12 +173,8 @@ def unheard(name: str, *, heard: bool) -> str:
     )
 
 
-def main() -> int:
-    """Run one feedback process; return its exit status."""
-    parent = Parent()
-    order = parent.order()
-    if order is None:
-        return 0
+def run(order: str, parent: Parent) -> None:
+    """Present until the parent is gone; raises what the component raises."""
     process = FeedbackProcess(FeedbackConfig.from_json(order), parent.tell)
 
     def listen() -> None:
@@ -190,22 +185,8 @@ def main() -> int:
         process.stop()
 
     threading.Thread(target=listen, name="from-launcher", daemon=True).start()
-    try:
-        process.run()
-    # The error's words are on their way before the error is let go of: with it go windows and sound
-    # servers, and their libraries may end the process.
-    except LabcraneError as error:
-        parent.tell({"failed": str(error)})
-        parent.close()
-        return 1
-    except Exception as error:
-        parent.tell({"failed": told(error)})
-        parent.close()
-        raise  # a plugin's mistake: its author needs the traceback
-    finally:
-        parent.close()
-    return 0
+    process.run()
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(serve(run))

@@ -8,10 +8,12 @@ import os
 import pickle
 import queue
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import IO, Any
 
+from labcrane.errors import LabcraneError
 from labcrane.processes.messages import Inbox, received, send
+from labcrane.processes.traceback import told
 
 
 class Parent:
@@ -79,3 +81,28 @@ class Parent:
     def _speak(self) -> None:
         send(self._outgoing, self._output)  # it ends early when the parent is gone
         self._closed.set()
+
+
+def serve(run: Callable[[Any, Parent], None]) -> int:
+    """Run the work of a child with its order; return the process's exit status.
+
+    A failure is reported as ``failed``, with its reason.
+    """
+    parent = Parent()
+    if (order := parent.order()) is None:
+        return 0
+    try:
+        run(order, parent)
+    # The error's words are on their way before the error is let go of: with it go windows and sound
+    # servers, and their libraries may end the process.
+    except LabcraneError as error:
+        parent.tell({"failed": str(error)})
+        parent.close()
+        return 1
+    except Exception as error:
+        parent.tell({"failed": told(error)})
+        parent.close()
+        raise  # a plugin's mistake: its author needs the traceback
+    finally:
+        parent.close()
+    return 0

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from labcrane.core.signals import Layout, Signal
 from labcrane.errors import LabcraneError, PluginError
+from labcrane.processes.traceback import told
 from labcrane.recording.crash_marker import SHIFT, CrashMarkerFile, Place
-from labcrane.registry.traceback import told
 
 if TYPE_CHECKING:
     import numpy as np

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple, TypeVar
 import pluggy
 
 from labcrane.errors import PluginError, suggestion
+from labcrane.processes.traceback import told
 from labcrane.registry.entry_points import EntryPoint, entry_points_of
 from labcrane.registry.hookspecs import PROJECT, ROLES, labcrane_commands
 from labcrane.registry.offers import API
-from labcrane.registry.traceback import told
 
 OfferT = TypeVar("OfferT")
 

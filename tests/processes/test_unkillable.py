@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from labcrane.capture import processes
-from labcrane.capture.config import CaptureConfig
 from labcrane.processes import handle
+from labcrane.session.part import PartConfig
 
 WAITS = """
 import signal
@@ -29,8 +29,12 @@ def test_a_recording_that_cannot_be_ended_is_left_and_named(
     (tmp_path / "waits_for_a_device.py").write_text(WAITS)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     end = subprocess.Popen.kill
-    config = CaptureConfig(
-        study=tmp_path, recorded=False, name="face", source="x", journal=tmp_path / "ses-01_run.xdf"
+    config = PartConfig(
+        protocol=tmp_path,
+        recorded=False,
+        name="face",
+        source="x",
+        journal=tmp_path / "ses-01_run.xdf",
     )
     with monkeypatch.context() as unkillable:
         unkillable.setattr(processes, "MODULE", "waits_for_a_device")
@@ -44,5 +48,5 @@ def test_a_recording_that_cannot_be_ended_is_left_and_named(
     end(left._present.process)
     left._present.process.wait()
     (line,) = left.watch()
-    assert line.startswith("failed: its process ended with exit code -9; it is tried again")
+    assert line.startswith("failed: its process ended with exit code -9; it is started again")
     left.stop()
