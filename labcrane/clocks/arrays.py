@@ -30,7 +30,6 @@ def correct(
     evening: Literal["auto", "forbid", "force"] = "auto",
     stamped: Literal["", "at_sampling", "when_sent"] = "",
     end: float | None = None,
-    own_clock: npt.ArrayLike | None = None,
 ) -> Corrected:
     """Map timestamps of another clock onto the receiver's, with the uncertainty of each.
 
@@ -72,10 +71,6 @@ def correct(
         leaves open.
     end
         When the recording ended, on the receiver's clock: shows that a source died before.
-    own_clock
-        The receiver's clock and, at the same moments, one of the same computer that nothing adjusts
-        (on Linux ``CLOCK_MONOTONIC`` and ``CLOCK_MONOTONIC_RAW``), shape ``(n_readings, 2)``:
-        where NTP slewed the receiver's clock meanwhile, the source is followed on the other one.
 
     Returns
     -------
@@ -137,21 +132,13 @@ def correct(
         when = _column("arrivals", arrivals, count)
         came = np.column_stack([np.arange(1.0, count + 1.0), when])
     index = None if counter is None else _column("counter", counter, count)
-    own = np.empty((0, 2))
-    if own_clock is not None:
-        own = np.asarray(own_clock, dtype=np.float64)
-        if own.ndim != 2 or own.shape[1] != 2 or not np.isfinite(own).all():  # noqa: PLR2004
-            raise RecordingError(
-                "own_clock must be finite numbers of the shape (n, 2), the receiver's clock and "
-                f"one that nothing adjusts; they have the shape {own.shape}"
-            )
     treatment = Treatment(
         rate_hz=rate_hz,
         stamped=Stamped(stamped),
         latency_s=latency_s,
         dejitter=EVENING[evening],
     )
-    return correct_raw(RawStream(taken, shown, came, index=index, own=own), treatment, end)
+    return correct_raw(RawStream(taken, shown, came, index=index), treatment, end)
 
 
 def _chosen(name: str, value: str, choices: Collection[str]) -> None:

@@ -191,8 +191,8 @@ def busy_and_slewed(random, *, sampler="own"):
     )  # fmt: skip
 
 
-def own_slewed(random, *, logged):
-    """NTP turns the recorder's own clock for a minute; on Linux its recorder logs that."""
+def own_slewed(random):
+    """NTP turns the recorder's own clock for a minute."""
     begin = START + random.uniform(50, 120)
     rate = random.choice([-1, 1]) * random.uniform(300e-6, 500e-6)
     end = begin + random.uniform(30, 90)
@@ -213,12 +213,7 @@ def own_slewed(random, *, logged):
         ]
     )
     came = np.column_stack([given.arrivals[:, 0], ours(given.arrivals[:, 1])])
-    read = np.sort(START + random.uniform(-1.0, drawn.truth[-1] - START + 1.0, 4 * len(local)))
-    read = read[np.r_[True, np.diff(read) > 0.05]]
-    crystal = random.uniform(-3e-5, 3e-5)
-    seen = read + random.exponential(2e-7, len(read))
-    log = np.column_stack([ours(read), 3e5 + seen * (1 + crystal)])
-    raw = RawStream(given.stamps, shown, came, own=log if logged else log[:0])
+    raw = RawStream(given.stamps, shown, came)
     return replace(drawn, raw=raw, truth=ours(drawn.truth), faults=frozenset({Fault.SLEWED}))
 
 
@@ -563,8 +558,7 @@ MORE: dict[str, Callable] = {
     "the same, and samples lost": partial(chunks_under_load, drops=True),
     "two or three faults at once": together,
     "wireless that comes and goes": bad_wireless,
-    "our own clock slewed, logged": lambda r: own_slewed(r, logged=True),
-    "our own clock slewed, not logged": lambda r: own_slewed(r, logged=False),
+    "our own clock slewed": own_slewed,
     "slewed, and its computer busy": busy_and_slewed,
     "slewed with its sampler, and its computer busy": partial(busy_and_slewed, sampler="turned"),
     "markers, slewed, and their computer busy": partial(busy_and_slewed, sampler="none"),

@@ -27,7 +27,6 @@ from labcrane.errors import RecordingError
 from labcrane.streams.sync import repeats
 from labcrane.streams.sync.dejitter import Dejitter, even, even_line, follow_sample_clock, left_open
 from labcrane.streams.sync.epochs import epochs
-from labcrane.streams.sync.own_clock import OwnClock
 from labcrane.streams.sync.placement import LATE_S, PULL_S, Placement, moving, place
 from labcrane.streams.sync.quality import (
     Basis,
@@ -170,9 +169,9 @@ def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> C
     of = repeats.first_of(raw.stamps, treatment.rate_hz) if treatment.rate_hz > 0.0 else None
     shown = len(raw.arrivals) > 0 or raw.sent_again or raw.index is not None
     if of is None or (not shown and _went_back(raw.stamps)):
-        return _on_our_clock(raw, treatment, end)
+        return _correct(raw, treatment, end)
     own = of == np.arange(len(of))
-    found = _on_our_clock(repeats.left_out(raw, own), treatment, end)
+    found = _correct(repeats.left_out(raw, own), treatment, end)
     where = repeats.place_of(of)
     time, uneven = found.time[where], found.uneven[where]
     terms = {name: term[where] for name, term in found.terms.items()}
@@ -244,20 +243,6 @@ def _some_untold(
         **_errors(time, terms, uneven),
     )
     return Corrected(time, terms, uneven, segments, quality)
-
-
-def _on_our_clock(raw: RawStream, treatment: Treatment, end: float | None) -> Corrected:
-    own = OwnClock.of(raw)
-    if own is None:
-        return _correct(raw, treatment, end)
-    last = None if end is None else float(own.straight(np.array([end]))[0])
-    found = _correct(own.straightened(raw), treatment, last)
-    if found.quality.whose:  # of our clock, or of none that was probed
-        return _correct(raw, treatment, end)
-    time, uneven = own.ours(found.time), own.ours(found.uneven)
-    terms = {**found.terms, Term.CLOCK: found.terms[Term.CLOCK] + own.doubt(time)}
-    quality = replace(found.quality, own_slews=own.slews(), **_errors(time, terms, uneven))
-    return Corrected(time, terms, uneven, found.segments, quality)
 
 
 def _correct(raw: RawStream, treatment: Treatment, end: float | None) -> Corrected:

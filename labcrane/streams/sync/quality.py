@@ -103,8 +103,6 @@ class Quality:
     steps, restarts, sleeps, slews
         How often its clock jumped, its program restarted, its computer slept, its clock was turned
         faster or slower.
-    own_slews
-        How often our own clock was turned so, by the recorder's log of it.
     congested_s
         How long probes took far longer than usual, one after the other.
     silent_s
@@ -162,7 +160,6 @@ class Quality:
     restarts: int = 0
     sleeps: int = 0
     slews: int = 0
-    own_slews: int = 0
     congested_s: float = 0.0
     silent_s: float = 0.0
     unsure: int = 0

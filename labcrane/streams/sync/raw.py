@@ -44,8 +44,6 @@ class RawStream:
         the range of samples in which the first one of the new process lies, ends included.
     index
         The source's own sample counter, unwrapped, shape ``(n,)``; None when it has none.
-    own
-        Our clock, and at the same moments one that nothing turns, shape ``(n_readings, 2)``.
     steady
         Stamps, on the same clock, of a regular stream of the same computer, whose sampler shows
         what probes do not, shape ``(n_steady,)``; its own where none are given and it is regular.
@@ -61,13 +59,12 @@ class RawStream:
     arrivals: FloatArray = field(default_factory=lambda: _nothing(2))
     resets: FloatArray = field(default_factory=lambda: _nothing(3))
     index: FloatArray | None = None
-    own: FloatArray = field(default_factory=lambda: _nothing(2))
     steady: FloatArray = field(default_factory=lambda: np.empty(0))
     own_probes: FloatArray | None = None
     sent_again: bool = False
 
     def __post_init__(self) -> None:
-        for name, columns in (("probes", 4), ("arrivals", 2), ("resets", 3), ("own", 2)):
+        for name, columns in (("probes", 4), ("arrivals", 2), ("resets", 3)):
             shape = getattr(self, name).shape
             if len(shape) != 2 or shape[1] != columns:  # noqa: PLR2004
                 raise RecordingError(f"{name} must have the shape (n, {columns}), but have {shape}")
@@ -128,7 +125,6 @@ def raw_of(recorded: RecordedStream) -> RawStream:
         probes=probes,
         arrivals=recorded.arrivals,
         resets=_resets(recorded),
-        own=recorded.own_clock[:, :2],
     )
     return replace(raw, sent_again=_same_values(recorded))
 

@@ -69,7 +69,7 @@ _ANY_STREAMS_FAULTS: dict[Fault, Callable[[Quality], bool]] = {
     Fault.STEPPED: lambda q: q.steps > 0,
     Fault.RESTARTED: lambda q: q.restarts > 0,
     Fault.SLEPT: lambda q: q.sleeps > 0,
-    Fault.SLEWED: lambda q: q.slews > 0 or q.own_slews > 0,
+    Fault.SLEWED: lambda q: q.slews > 0,
     Fault.CONGESTED: lambda q: q.congested_s > CONGESTED_S,
     Fault.UNPROBED: lambda q: not q.whose and q.unprobed > 0,
     Fault.RECEIVER: lambda q: q.whose == "receiver",

@@ -316,12 +316,10 @@ def _clock(quality: Quality, limits: Limits) -> _Judged:
 
 def _changes(quality: Quality) -> _Judged:
     """Name what happened to its clock and on the way to it."""
-    own = "this computer's own clock was slewed {} times"
     for count, what, advice in (
         (quality.steps, "its clock jumped {} times", "find what sets its computer's clock"),
         (quality.sleeps, "its computer slept {} times", "switch off its power saving"),
         (quality.slews, "a clock was slewed {} times", "switch off NTP while you record"),
-        (quality.own_slews, own, "switch off NTP here while you record"),
     ):
         if count:
             yield Verdict.WARN, what.format(count), f"corrected; {advice}"
