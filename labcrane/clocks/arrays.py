@@ -43,8 +43,7 @@ def correct(
     models is weighed by likelihood, and averaged by it.
 
     If probes jump by more than round trips allow, a new clock begins there. Samples without probes
-    are placed by their arrival, and marked so. If probes show that the clock was adjusted while a
-    regular stream's sampler continued, its count is followed instead of the clock.
+    are placed by their arrival, and marked so.
 
     Parameters
     ----------

@@ -11,8 +11,7 @@ from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.dejitter import Dejitter
 from labcrane.streams.sync.offset import fit
 from labcrane.streams.sync.quality import Basis
-from labcrane.streams.sync.raw import OFFSET, REMOTE, RTT, RawStream
-from labcrane.streams.sync.steady_sampler import SteadySampler
+from labcrane.streams.sync.raw import REMOTE, RTT, RawStream
 
 REGULAR = Treatment(rate_hz=500.0, dejitter=Dejitter.NONE)
 MARKERS = Treatment()
@@ -238,54 +237,6 @@ def test_a_curve_that_no_ways_of_its_probes_allow_says_so(random):
     moved = replace(curve, smoothed=replace(curve.smoothed, offset=curve.smoothed.offset + 2e-3))
     least = 2e-3 - np.abs(curve.residuals) - probes[:, RTT] / 2.0
     assert (moved.with_error(probes[:, REMOTE])[1] >= least).all()
-
-
-def turned_while_busy(times, random, *, stamped=None):
-    """Return a clock that runs 0.3 % off from 150 to 170, and whose probes wait from 140 to 180."""
-
-    def clock(t):
-        return t + 1000.0 + 3e-3 * (np.clip(t, 150.0, 170.0) - 150.0)
-
-    raw = source(clock, times, random, stamped=stamped)
-    probes = raw.probes.copy()
-    near = (probes[:, 3] > 140.0) & (probes[:, 3] < 180.0)
-    there, back = random.exponential(0.004, (2, int(near.sum())))
-    probes[near, RTT] += there + back
-    probes[near, OFFSET] += (back - there) / 2.0
-    return replace(raw, probes=probes), clock
-
-
-def test_a_steady_sampler_shows_a_turn_that_every_probe_was_held_up_in(random):
-    times = regular()
-    raw, _ = turned_while_busy(times, random)
-    corrected = correct(raw, REGULAR)
-    assert np.abs(corrected.time - times).max() < 1e-4
-    assert (np.abs(corrected.time - times) <= corrected.error).mean() > 0.99
-    assert corrected.quality.slews == 2
-    blind = correct(raw, replace(REGULAR, rate_hz=0.0))  # as markers, of which nothing is steady
-    assert np.abs(blind.time - times).max() > 5e-4
-
-
-def test_a_sampler_that_goes_by_the_turned_clock_is_not_taken_for_steady(random):
-    read = 1100.0 + np.arange(60_000) / 500.0
-    fine = np.linspace(100.0, 221.0, 1_000_001)
-    _, clock = turned_while_busy(fine[:2000], random)
-    times = np.interp(read, clock(fine), fine)
-    raw = source(clock, times, random)
-    corrected = correct(raw, REGULAR)
-    assert np.ptp(np.diff(raw.stamps)) < 1e-6
-    assert p95(corrected, times) < 3e-5
-    assert corrected.quality.slews == 2
-
-
-def test_a_sampler_is_steady_only_where_its_count_is_sure(random):
-    times = regular()
-    assert SteadySampler.of(times) is not None
-    assert SteadySampler.of(np.delete(times, np.arange(50, len(times), 700))) is not None
-    assert SteadySampler.of(times[:50]) is None
-    assert SteadySampler.of(times[::-1]) is None
-    assert SteadySampler.of(np.sort(times + random.normal(0.0, 2e-4, len(times)))) is None
-    assert SteadySampler.of(np.r_[times[:900], times[900:] + 1.2345]) is None
 
 
 def test_a_clock_that_was_probed_once_is_placed_by_that_probe(random):

@@ -103,8 +103,8 @@ def test_two_devices_of_one_computer_agree(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_markers_agree_with_the_samples_beside_them_while_their_clock_is_turned(seed: int) -> None:
-    """Every probe waits meanwhile, and only the samples show the turn."""
+def test_markers_and_samples_agree_as_stated_while_their_clock_is_turned(seed: int) -> None:
+    """Every probe waits meanwhile, and one has no stamps that show whether it stepped."""
     random = np.random.default_rng(seed)
     clock = Clock(random)
     clock.slew(random.choice([-1, 1]) * random.uniform(1e-3, 4e-3), 1050.0, 1070.0)
@@ -118,15 +118,13 @@ def test_markers_agree_with_the_samples_beside_them_while_their_clock_is_turned(
         RawStream(clock(times), probes(clock, 1000.5, samples[-1], random, congestion=busy))
         for times in (samples, markers)
     ]
-    off = []
-    for raws in (given, pooled(given, ["lab", "lab"])):
-        placed, told = (
-            correct_raw(raw, Treatment(rate)).time
-            for raw, rate in zip(raws, (250.0, 0.0), strict=True)
-        )
-        off.append(told - markers - np.interp(markers, samples, placed - samples))
-    assert np.abs(off[1]).max() < 5e-5
-    assert np.abs(off[0]).max() > 5e-4
+    placed, told = (
+        correct_raw(raw, Treatment(rate))
+        for raw, rate in zip(pooled(given, ["lab", "lab"]), (250.0, 0.0), strict=True)
+    )
+    off = told.time - markers - np.interp(markers, samples, placed.time - samples)
+    stated = told.error + np.interp(markers, samples, placed.error)
+    assert np.mean(np.abs(off) <= stated) >= 0.95
 
 
 def test_clocks_that_differ_are_not_pooled_whatever_their_host_is_called(

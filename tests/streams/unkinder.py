@@ -181,13 +181,13 @@ def busy_and_slewed(random, *, sampler="own"):
         rate, times = 0.0, np.sort(random.uniform(times[0], times[-1], 600))
     faults = frozenset({Fault.SLEWED} if sampler == "own" else ())
     perhaps = {
-        "own": {Fault.CONGESTED},
+        "own": {Fault.CONGESTED, Fault.LATE_STAMPS},
         "turned": {Fault.CONGESTED, Fault.SLEWED, Fault.CHANGED_RATE},
         "none": {Fault.CONGESTED, Fault.SLEWED, Fault.STEPPED},
     }[sampler]
     return received(
         random, clock, times, rate, way=random.uniform(1.5e-5, 1e-4), congestion=waits,
-        clean=sampler == "own", faults=faults, perhaps=frozenset(perhaps),
+        clean=False, faults=faults, perhaps=frozenset(perhaps),
     )  # fmt: skip
 
 

@@ -21,8 +21,6 @@ class Smoothed:
         Of offset and skew: variance, covariance, variance, shape ``(n, 3)``, in seconds.
     walk
         Variance by which skew walks in a second, between neighbours, shape ``(n - 1,)``.
-    evidence
-        Log likelihood of the measurements, averaged over the models.
     """
 
     time: FloatArray
@@ -30,12 +28,6 @@ class Smoothed:
     skew: FloatArray
     covariance: FloatArray
     walk: FloatArray
-    evidence: float
-
-    @property
-    def has_knees(self) -> bool:
-        """Whether skew was let change freely anywhere."""
-        return bool(len(self.walk)) and bool(self.walk.max() > 4.0 * np.median(self.walk) + 1e-12)
 
     def at(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return offset and its standard deviation at any times, shape ``(n_times,)`` each.

@@ -403,7 +403,7 @@ def _summed(
         steps=steps,
         restarts=restarts,
         sleeps=sleeps,
-        slews=sum(len(curve.slews()) for curve in curves),
+        slews=sum(curve.slews() for curve in curves),
         congested_s=sum(curve.congested_s() for curve in curves),
         silent_s=0.0 if end is None or np.isnan(last) else max(float(end - last), 0.0),
         unsure=sum(segment.unsure for segment in segments),

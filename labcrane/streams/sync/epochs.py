@@ -27,9 +27,6 @@ FASTEST_DRIFT = 500e-6
 FASTEST_SLEW = 0.02
 """No system turns its clock by more to set it right."""
 
-SEEN = 20
-"""So many stamps at least show that they go on."""
-
 CERTAIN_S = 0.1
 """Jumps beyond this show in the times of arrival, whatever the network did."""
 
@@ -92,8 +89,6 @@ def epochs(raw: RawStream, *, regular: bool) -> list[Epoch]:
     probes, jumps = _without_strays(probes, jumps)
     if regular:
         jumps = [k for k in jumps if not _goes_on(raw, probes[k - 1], probes[k])]
-    elif len(raw.steady):
-        jumps = [k for k in jumps if not _another_goes_on(raw.steady, probes[k - 1], probes[k])]
     changes = _changes(raw, probes, jumps, regular=regular)
     bounds = [_Change(0, 0), *changes, _Change(len(probes), len(raw.stamps))]
     found = []
@@ -204,16 +199,6 @@ def _goes_on(raw: RawStream, before: FloatArray, after: FloatArray) -> bool:
         return False
     jump = before[OFFSET] - after[OFFSET]
     return _step_between_stamps(raw.stamps, low, high, jump) is None
-
-
-def _another_goes_on(steady: FloatArray, before: FloatArray, after: FloatArray) -> bool:
-    """Whether stamps of a steady sampler of the same computer go on evenly there."""
-    step, jump = (abs(float(after[k] - before[k])) for k in (REMOTE, OFFSET))
-    first, last = sorted((before[REMOTE], after[REMOTE]))
-    near = np.diff(steady[(steady > first - 1.0) & (steady < last + 1.0)])
-    if jump > FASTEST_SLEW * step or len(near) < SEEN:
-        return False
-    return bool(np.abs(near - np.median(near)).max() < jump / 2.0)
 
 
 def _step(

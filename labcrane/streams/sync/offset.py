@@ -7,7 +7,6 @@ import numpy as np
 from labcrane.streams.sync.clock_curve import Smoothed
 from labcrane.streams.sync.raw import OFFSET, REMOTE, RTT
 from labcrane.streams.sync.smoother import smooth
-from labcrane.streams.sync.steady_sampler import SteadySampler
 from labcrane.types import FloatArray
 
 SURE = 1.96
@@ -26,9 +25,6 @@ COARSE_S = (1.0 / 64.0, 0.01, 1e-3, 1e-4)
 ENOUGH, NEARLY = 8, 1e-3
 """So many round trips of whole units of a clock, and so nearly whole, do not occur by chance."""
 
-CLEARLY = 7.0
-"""Log of the odds, a thousand to one, from which on the sampler is taken to be the steadier."""
-
 
 @dataclass(frozen=True, slots=True)
 class OffsetCurve:
@@ -37,35 +33,24 @@ class OffsetCurve:
     Attributes
     ----------
     smoothed
-        At the probes; of the sampler's count where there is a sampler.
+        At the probes.
     probes
         What it rests on, in the order of the clock, shape ``(n, 4)``.
     least_rtt
         The shortest round trip: half of it bounds what a lasting asymmetry of the path can hide.
-    sampler
-        What is followed in place of the clock, because it went on while that was turned.
     """
 
     smoothed: Smoothed
     probes: FloatArray
     least_rtt: float
-    sampler: SteadySampler | None = None
 
     def __call__(self, times: FloatArray) -> FloatArray:
         """Return the offset at times of the clock, shape ``(n,)``; goes on straight beyond."""
-        return self._at(times)[0]
-
-    def _at(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the offset and its standard deviation, shape ``(n,)`` each."""
-        if self.sampler is None:
-            return self.smoothed.at(times)
-        read = self.sampler(times)
-        offset, deviation = self.smoothed.at(read)
-        return offset + (read - times), deviation + self.sampler.noise_s
+        return self.smoothed.at(times)[0]
 
     def with_error(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the offset, and how far it may be off at 95 %, in seconds, shape ``(n,)`` each."""
-        offset, deviation = self._at(times)
+        offset, deviation = self.smoothed.at(times)
         # Where every exchange was long, what is known of the ways rests on a model of them.
         around = np.minimum.reduceat(
             np.pad(self.excess, AROUND, mode="edge"),
@@ -84,50 +69,30 @@ class OffsetCurve:
     @property
     def slope(self) -> float:
         """Usual change of the offset, in seconds per second."""
-        if self.sampler is None:
-            return float(np.median(self.smoothed.skew))
-        return float(np.median(self._skews()[1]))
+        return float(np.median(self.smoothed.skew))
 
     @property
     def residuals(self) -> FloatArray:
         """How far the probes lie from the curve, in seconds, shape ``(n,)``."""
         return np.asarray(self.probes[:, OFFSET] - self(self.probes[:, REMOTE]))
 
-    def _skews(self) -> tuple[FloatArray, FloatArray]:
-        """Return times of the clock, a second apart, and the change of the offset from each."""
-        first, last = self.probes[[0, -1], REMOTE]
-        times = np.arange(first, max(last, first + 1.0) + 1.0)
-        return times[:-1], np.diff(self(times))
-
     @property
     def excess(self) -> FloatArray:
         """By how much each round trip was longer than the shortest, in seconds, shape ``(n,)``."""
         return np.asarray(self.probes[:, RTT] - self.least_rtt)
 
-    def slews(self) -> list[tuple[float, float]]:
-        """Return when, in the clock's time, its rate was changed at once, and by how much."""
-        time, skew = self.smoothed.time, self.smoothed.skew
-        if self.sampler is not None:
-            time, skew = self._skews()
-        if len(time) < 2:  # noqa: PLR2004
-            return []
-        found: list[tuple[float, float]] = []
-        last = -LONG
-        for k in self._free(skew):
+    def slews(self) -> int:
+        """Return how often its rate was changed at once."""
+        skew, walk = self.smoothed.skew, self.smoothed.walk
+        count, last = 0, -LONG
+        usual = float(np.median(walk)) if len(walk) else 0.0
+        for k in np.flatnonzero(walk > 4.0 * usual + 1e-12):
             before, after = skew[max(k - LONG, 0) : k], skew[k + 2 : k + 2 + LONG]
-            if len(before) > 1 and len(after) > 1 and k - last >= LONG:
-                change = float(np.median(after) - np.median(before))
-                if abs(change) > SLEW:
-                    found.append((float(time[k]), change))
-                    last = k
-        return found
-
-    def _free(self, skew: FloatArray) -> list[int]:
-        """Return between which skews the clock may have been turned."""
-        if self.sampler is None:
-            walk = self.smoothed.walk
-            return list(map(int, np.flatnonzero(walk > 4.0 * np.median(walk) + 1e-12)))
-        return list(map(int, np.flatnonzero(np.abs(np.diff(skew)) > SLEW / 2.0)))
+            if min(len(before), len(after)) < 2 or k - last < LONG:  # noqa: PLR2004
+                continue
+            if abs(float(np.median(after) - np.median(before))) > SLEW:
+                count, last = count + 1, int(k)
+        return count
 
     def congested_s(self) -> float:
         """Return for how long round trips were far longer than usual, one probe after the other."""
@@ -151,9 +116,7 @@ def _own_unit(trips: FloatArray) -> float:
     return 0.0
 
 
-def fit(
-    probes: FloatArray, usual_slope: float, sampler: SteadySampler | None = None
-) -> OffsetCurve:
+def fit(probes: FloatArray, usual_slope: float) -> OffsetCurve:
     """Fit a clock's offset to its probes.
 
     In the clock's own time at the probe and not in the time when the probe was looked at: pairing
@@ -161,26 +124,15 @@ def fit(
     much longer its round trip was than the shortest of all, as NTP's huff-n'-puff filter does:
     that bounds what congestion on one way can have added.
 
-    Where probes show that the clock was turned, the sampler whose samples it stamps is followed in
-    its place, if the probes are likelier by a sampler that was not turned.
-
     Parameters
     ----------
     probes
         Of one clock, at least one, shape ``(n, 4)``.
     usual_slope
         Of other clocks of this source: what a few probes in a short time leave open.
-    sampler
-        Whose samples the clock stamps; None where there is none that is steady.
     """
     ordered = probes[np.argsort(probes[:, REMOTE], kind="stable")]
-    remote, offset = ordered[:, REMOTE], ordered[:, OFFSET]
     least = float(ordered[:, RTT].min())
     excess = ordered[:, RTT] - least
-    by_clock = smooth(remote, offset, excess, usual_slope)
-    if sampler is not None and by_clock.has_knees:
-        read = sampler(remote)
-        by_sampler = smooth(read, offset - (read - remote), excess, usual_slope)
-        if by_sampler.evidence > by_clock.evidence + CLEARLY:
-            return OffsetCurve(by_sampler, ordered, least, sampler)
-    return OffsetCurve(by_clock, ordered, least)
+    smoothed = smooth(ordered[:, REMOTE], ordered[:, OFFSET], excess, usual_slope)
+    return OffsetCurve(smoothed, ordered, least)

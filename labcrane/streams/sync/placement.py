@@ -11,7 +11,6 @@ from labcrane.streams.sync.offset import SURE, OffsetCurve, fit
 from labcrane.streams.sync.quality import Basis, ClockSegment
 from labcrane.streams.sync.raw import REMOTE, RawStream
 from labcrane.streams.sync.smoother import smooth
-from labcrane.streams.sync.steady_sampler import SteadySampler
 from labcrane.streams.sync.terms import Term, Terms
 from labcrane.types import FloatArray
 
@@ -113,7 +112,7 @@ _Piece = tuple[int, int, Epoch, OffsetCurve | None]
 
 def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placement:
     """Place every sample, by its own clock's probes, else by arrivals, else not at all (NaN)."""
-    curves = _curves(raw, stretches, regular=regular)
+    curves = _curves(stretches)
     arrival = raw.arrival()
     least = _least_lag(raw.stamps, arrival, stretches, curves, regular=regular)
     whose, ahead = "", 0.0
@@ -194,7 +193,7 @@ def _hold_frozen(stamps: FloatArray, time: FloatArray, error: FloatArray) -> tup
     return int(more.sum()), int(more[more >= LONG_STAND - 1].sum())
 
 
-def _curves(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> list[OffsetCurve | None]:
+def _curves(stretches: list[Epoch]) -> list[OffsetCurve | None]:
     """Return each clock's curve, the longest known first: it lends its slope to brief ones."""
     curves: list[OffsetCurve | None] = [None] * len(stretches)
     slope = 0.0
@@ -203,19 +202,9 @@ def _curves(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> list[Of
     ]
     for k in sorted(range(len(stretches)), key=lambda k: -lengths[k]):
         if len(stretches[k].probes):
-            sampler = _sampler(raw, stretches[k], regular=regular)
-            curve = curves[k] = fit(stretches[k].probes, slope, sampler)
+            curve = curves[k] = fit(stretches[k].probes, slope)
             slope = slope or curve.slope
     return curves
-
-
-def _sampler(raw: RawStream, epoch: Epoch, *, regular: bool) -> SteadySampler | None:
-    """Return a sampler that the clock stamps: that of its computer, else the stream's own."""
-    if len(raw.steady):
-        first, last = epoch.probes[:, REMOTE].min(), epoch.probes[:, REMOTE].max()
-        near = (raw.steady > first - ORDER_S) & (raw.steady < last + ORDER_S)
-        return SteadySampler.of(raw.steady[near])
-    return SteadySampler.of(raw.stamps[epoch.start : epoch.stop]) if regular else None
 
 
 def _least_lag(
@@ -258,7 +247,7 @@ def _stamped_by(
     early = SOONER_S + hidden
     if -early <= raw <= LATE_S and (least < -early or raw < least - 2.0 * early):
         return "receiver"
-    # Without a sampler to go by, what seems to be too early may be the curve's own uncertainty.
+    # Where no sample is due, what seems to be too early may be the curve's own uncertainty.
     sooner = EARLY_S if regular else WRONG_CLOCK_S
     if -sooner <= least <= LATE_S:
         return ""

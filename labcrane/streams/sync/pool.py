@@ -7,7 +7,6 @@ import numpy as np
 
 from labcrane.streams.sync.epochs import in_order
 from labcrane.streams.sync.raw import LOCAL, OFFSET, REMOTE, RTT, RawStream
-from labcrane.streams.sync.steady_sampler import SteadySampler
 from labcrane.types import FloatArray
 
 SAME_S = 5e-4
@@ -18,9 +17,8 @@ def pooled(streams: Sequence[RawStream], hosts: Sequence[str]) -> list[RawStream
     """Return the streams with all probes of their computer's clock.
 
     Two devices on one computer are then mapped by one curve, and agree with each other whatever the
-    network does; markers, too, have the steady sampler of a regular stream beside them. That they
-    share a clock is seen in their probes: a program in a container, or under a debugger of clocks,
-    may have one of its own.
+    network does. That they share a clock is seen in their probes: a program in a container, or
+    under a debugger of clocks, may have one of its own.
 
     Parameters
     ----------
@@ -30,10 +28,6 @@ def pooled(streams: Sequence[RawStream], hosts: Sequence[str]) -> list[RawStream
         The computer of each; empty where it is not known.
     """
     ordered = [in_order(stream.probes) for stream in streams]
-    is_steady = [
-        hosts.count(host) > 1 and SteadySampler.of(stream.stamps) is not None
-        for stream, host in zip(streams, hosts, strict=True)
-    ]
     result = []
     for k, (stream, host) in enumerate(zip(streams, hosts, strict=True)):
         others = [
@@ -46,10 +40,7 @@ def pooled(streams: Sequence[RawStream], hosts: Sequence[str]) -> list[RawStream
             continue
         together = np.concatenate([ordered[j] for j in (k, *others)])
         together = together[np.argsort(together[:, LOCAL], kind="stable")]
-        same = [streams[j].stamps for j in sorted((k, *others)) if is_steady[j]]
-        # The same one for all streams of a computer, so that they agree where it is followed.
-        steady = max(same, key=np.ptp, default=np.empty(0))
-        result.append(replace(stream, probes=together, steady=steady, own_probes=ordered[k]))
+        result.append(replace(stream, probes=together, own_probes=ordered[k]))
     return result
 
 

@@ -44,9 +44,6 @@ class RawStream:
         the range of samples in which the first one of the new process lies, ends included.
     index
         The source's own sample counter, unwrapped, shape ``(n,)``; None when it has none.
-    steady
-        Stamps, on the same clock, of a regular stream of the same computer, whose sampler shows
-        what probes do not, shape ``(n_steady,)``; its own where none are given and it is regular.
     own_probes
         Those that its own program answered, where ``probes`` are all of its computer's, shape
         ``(n_own, 4)``; else None.
@@ -59,7 +56,6 @@ class RawStream:
     arrivals: FloatArray = field(default_factory=lambda: _nothing(2))
     resets: FloatArray = field(default_factory=lambda: _nothing(3))
     index: FloatArray | None = None
-    steady: FloatArray = field(default_factory=lambda: np.empty(0))
     own_probes: FloatArray | None = None
     sent_again: bool = False
 

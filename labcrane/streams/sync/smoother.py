@@ -146,7 +146,6 @@ def smooth(
         mean[:, 1] / MICRO,
         covariance / MICRO**2,
         walk / MICRO**2,
-        float(odds.max()),
     )
 
 
