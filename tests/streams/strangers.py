@@ -98,8 +98,9 @@ def ticking(random):
         stamps = np.floor(stamps / told + 1e-6) * told
     return replace(
         drawn, raw=replace(drawn.raw, stamps=stamps), grid_s=tick + told, chance=True,
-        faults=frozenset({Fault.COARSE}),
-        perhaps=frozenset({Fault.FROZEN, Fault.LATE_STAMPS, Fault.SLOW, Fault.NOISY}),
+        perhaps=frozenset(
+            {Fault.COARSE, Fault.FROZEN, Fault.LATE_STAMPS, Fault.SLOW, Fault.NOISY}
+        ),
     )  # fmt: skip
 
 
