@@ -130,7 +130,7 @@ def guest(random):
     shown = frozenset({Fault.STEPPED, Fault.SLEWED, Fault.CONGESTED, Fault.FROZEN, Fault.LOST})
     return received(
         random, clock, times, 250.0, clean=False, chance=True,
-        faults=frozenset({Fault.STRAYED}), perhaps=shown,
+        perhaps=shown,
     )  # fmt: skip
 
 

@@ -460,7 +460,6 @@ def _flow(placed: Placement, sampled: list[_Sampled], *, regular: bool) -> dict[
         "disordered": sum(one.disordered for one in each),
         "stalls": sum(one.stalls for one in each),
         "longest_stall_s": max((one.longest_stall_s for one in each), default=0.0),
-        "strayed": sum(one.strayed for one in each),
         "shifts": sum(len(one) for one in shifts),
         "shift_s": max((float(np.abs(one).max()) for one in shifts if len(one)), default=0.0),
         "grid_s": max((one.grid_s for one in each), default=0.0),

@@ -96,8 +96,6 @@ class Quality:
         they contradict it.
     shifts, shift_s
         How often stamps are later, or sooner, from one sample on, by the largest shift.
-    strayed
-        Samples that are stamped beside their even count for a while.
     moved_p95_s, moved_max_s
         By how much evening moved samples.
     steps, restarts, sleeps, slews
@@ -153,7 +151,6 @@ class Quality:
     contradicted: str = ""
     shifts: int = 0
     shift_s: float = 0.0
-    strayed: int = 0
     moved_p95_s: float = 0.0
     moved_max_s: float = 0.0
     steps: int = 0

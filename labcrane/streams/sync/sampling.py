@@ -30,9 +30,6 @@ EXACT = 0.1
 FEW_LOST = 0.1
 """Where more steps than this part are of several periods, they may be those of polls."""
 
-STRAY_S, SHARP = 3e-4, 8.0
-"""What strays does so by more than the first, and than so many times what most samples do."""
-
 WHOLE = 0.25
 """A step this close to whole periods has lost whole samples."""
 
@@ -110,8 +107,6 @@ class Sampling:
     uneven_s
         By how much stamps scatter about a steady clock, at 95 %, that are taken to be right: as
         samples of an uneven sampler are, and those which are late by delays to both sides alike.
-    strayed
-        How many samples are stamped beside their count for a while, and back.
     breaks
         The samples behind holes of which nothing shows how many periods they are.
     unsure_s
@@ -156,7 +151,6 @@ class Sampling:
     longest_stall_s: float = 0.0
     index: FloatArray = field(default_factory=lambda: np.empty(0))
     uneven_s: float = 0.0
-    strayed: int = 0
     breaks: npt.NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     unsure_s: FloatArray | float = 0.0
     back_s: float = 0.0
@@ -311,14 +305,14 @@ def examine(
                 shift_s=receipt.open_shift(flowed, index),
                 breaks=found.breaks[: 0 if counter is None else None],
                 chunk_s=found.chunk_s,
-                wander_s=found.moves(stamps, waited.period, index).open_s,
+                wander_s=found.moves(stamps, waited.period, index),
             )
     # Where few slip, no count shows where in their units samples were taken.
     shown = grid if slips >= FEW else 0.0
     noise, late, by_grid, uneven = _noise(time, arrival, found, shown, late=late)
     rates = _rates(found)
     steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
-    moves = None
+    moves: FloatArray | float = 0.0
     if probed and not disordered:
         moves = found.moves(stamps, found.period, found.index)
     unplaced = late and counter is None and (found.clumped or found.missing > 0)
@@ -342,12 +336,11 @@ def examine(
         longest_stall_s=longest,
         index=index if disordered else found.index,
         uneven_s=uneven,
-        strayed=0 if moves is None or rates else found.strayed(moves.passing_s),
         breaks=found.breaks,
         slip_s=found.period if found.slips else 0.0,
         shift_s=receipt.open_shift(found.flowed, found.index) if late else 0.0,
         chunk_s=found.chunk_s,
-        wander_s=0.0 if moves is None else moves.open_s,
+        wander_s=moves,
     )
 
 
@@ -415,20 +408,14 @@ class _Steps:
     computed: bool
     clumped: bool
     shifted: shifts.Shifts
-    stray_s: float
     slips: bool
     chunk_s: float
 
-    def moves(self, stamps: FloatArray, period: float, index: FloatArray) -> wander.Wander:
+    def moves(self, stamps: FloatArray, period: float, index: FloatArray) -> FloatArray:
         """Return how the level of stamps changes on both clocks: one of them may be slewed."""
         unmoved = self.unpaused - self.time
         ours, theirs = (wander.find(each + unmoved, index, period) for each in (self.time, stamps))
-        return wander.Wander(np.minimum(ours.open_s, theirs.open_s), ours.passing_s)
-
-    def strayed(self, passing_s: FloatArray) -> int:
-        """Return how many samples stray by more than steps scatter, and come back."""
-        usual = SHARP * float(np.quantile(passing_s, 0.75))  # a rate that waves strays all along
-        return int(np.count_nonzero(passing_s > max(self.stray_s, usual)))
+        return np.minimum(ours, theirs)
 
 
 def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -> _Steps:
@@ -480,12 +467,9 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
             position = position + np.repeat(before, np.diff(np.r_[first, len(time)]))
             missing += max(int(before[-1]), 1)
     longest = float(steps[gaps].max(initial=0.0))
-    # A long hole may be off by a part of a period, and what is behind it seem to stray.
-    even = exact and not grid and not len(breaks) and float(whole.max()) < levels.LONG_HOLE
     return _Steps(
         time, flowed, unpaused, breaks + 1, mean, local, position, missing, int(gaps.sum()),
         longest, exact, computed, clumped, shifted,
-        max(STRAY_S, 8.0 * scatter) if even else np.inf,
         exact and not counted and hole.may_be_slips(len(steps)),
         0.0 if exact else _half_a_chunk(steps / counts, typical),
     )  # fmt: skip

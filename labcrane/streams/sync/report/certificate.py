@@ -34,7 +34,6 @@ class Fault(StrEnum):
     SHIFTED = "paused, or delay changed"
     FROZEN = "stamps that stand still"
     REPEATED = "samples sent again"
-    STRAYED = "stamps that stray and return"
     STEPPED = "clock stepped"
     RESTARTED = "restarted"
     SLEPT = "computer slept"
@@ -56,7 +55,6 @@ _FAULTS: dict[Fault, Callable[[Quality, float], bool]] = {
     Fault.SHIFTED: lambda q, _: q.shifts > 0,
     Fault.FROZEN: lambda q, _: q.frozen > 0,
     Fault.REPEATED: lambda q, _: q.repeated > 0,
-    Fault.STRAYED: lambda q, _: q.strayed > 0,
 }
 """Of regular streams only."""
 

@@ -251,10 +251,6 @@ def _order(quality: Quality) -> _Judged:
     if quality.frozen:
         text = f"{quality.frozen} samples have the timestamp of the one before"
         yield Verdict.WARN, text, "exclude the trials they are in; check its program"
-    if quality.strayed:
-        text = f"{quality.strayed} samples leave their regular grid for a while: a clock stopped "
-        text += "and caught up, or its sampler waited"
-        yield Verdict.WARN, text, "give a virtual machine a core of its own, or none"
     if quality.repeated:
         text = f"{quality.repeated} samples were sent again with the same timestamp"
         yield Verdict.WARN, text, "remove them before you filter or average it"

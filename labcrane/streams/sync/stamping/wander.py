@@ -5,8 +5,6 @@ it, at once or by and by. Nothing in the stamps tells one from the other, so tha
 and the uncertainty holds all of them.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
@@ -32,25 +30,11 @@ MOST_S = 0.5
 """No buffer on the way holds more: that is a pause, or a sampler whose rate changes."""
 
 
-@dataclass(frozen=True, slots=True)
-class Wander:
-    """How the level of stamps changes, in seconds.
+def find(time: FloatArray, index: FloatArray, period: float) -> FloatArray:
+    """Return how the level of stamps changes, in seconds, shape ``(n,)``.
 
-    Attributes
-    ----------
-    open_s
-        How far the level around each sample is from that of any other time, less what a quartz may
-        have done in between, shape ``(n,)``.
-    passing_s
-        How far it is from the level of the seconds before and behind, shape ``(n,)``.
-    """
-
-    open_s: FloatArray
-    passing_s: FloatArray
-
-
-def find(time: FloatArray, index: FloatArray, period: float) -> Wander:
-    """Return how the level of stamps changes.
+    How far the level around each sample is from that of any other time, less what a quartz may have
+    done in between.
 
     Parameters
     ----------
@@ -63,7 +47,7 @@ def find(time: FloatArray, index: FloatArray, period: float) -> Wander:
     size = max(FEWEST, round(BLOCK_S / period))
     count = len(time) // size
     if count < 2:  # noqa: PLR2004
-        return Wander(*np.zeros((2, len(time))))
+        return np.zeros(len(time))
     due = period * (index - index[0])
     late = (time - time[0] - due)[: count * size].reshape(count, size)
     level = np.sort(late, axis=1)[:, size // 4 : size - size // 4].mean(axis=1)
@@ -71,16 +55,15 @@ def find(time: FloatArray, index: FloatArray, period: float) -> Wander:
     far = min(max(STRETCH, count // 5), count - 1)
     level = level - at * _usual((level[far:] - level[:-far]) / (at[far:] - at[:-far]))
     lasting = _lasting(level)
-    passing = np.abs(level - lasting)
     walked = _walked(at, lasting)
     if float(np.ptp(lasting - walked)) > MOST_S:
         walked = lasting
     level, lasting = level - walked, lasting - walked
-    by_chance = SURE * 1.4826 * float(np.median(passing))
+    by_chance = SURE * 1.4826 * float(np.median(np.abs(level - lasting)))
     open_s = np.maximum(np.maximum(lasting.max() - level, level - lasting.min()) - by_chance, 0.0)
     around = sliding_window_view(np.pad(open_s, 1, mode="edge"), 3).max(axis=1)
     sizes = np.diff(np.r_[np.arange(count) * size, len(time)])
-    return Wander(np.repeat(around, sizes), np.repeat(passing, sizes))
+    return np.repeat(around, sizes)
 
 
 def _usual(rates: FloatArray) -> float:
