@@ -10,11 +10,17 @@ from streams.unkinder import MORE, a_little_off, announced
 from labcrane.streams.sync.correction import Treatment
 from labcrane.streams.sync.report.certificate import Fault
 
+AGAIN = frozenset(
+    {Fault.LATE_STAMPS, Fault.SHIFTED, Fault.DISORDERED, Fault.FROZEN}
+    | {Fault.WRONG_RATE, Fault.CHANGED_RATE}
+)
+"""What samples that are sent again look like: nothing tells them from others of one stamp."""
+
 
 def several_times(random):
     """Every sample is sent several times, by a program that asks faster than its device samples."""
     times = np.repeat(regular(random, 125.0), int(random.integers(2, 4)))
-    return received(random, Clock(random), times, 125.0, faults=frozenset({Fault.REPEATED}))
+    return received(random, Clock(random), times, 125.0, clean=False, perhaps=AGAIN)
 
 
 def resent(random):
@@ -27,7 +33,7 @@ def resent(random):
     taken = np.repeat(blocks, often, axis=0)
     sent = np.repeat(np.maximum.accumulate(taken[:, -1]), size)
     return received(
-        random, Clock(random), taken.ravel(), 250.0, sent=sent, faults=frozenset({Fault.REPEATED})
+        random, Clock(random), taken.ravel(), 250.0, sent=sent, clean=False, perhaps=AGAIN
     )
 
 

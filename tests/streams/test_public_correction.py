@@ -293,19 +293,3 @@ def test_an_xdf_file_that_is_not_there_is_told(
 ) -> None:
     assert main(["resync", str(tmp_path / "no.xdf")]) == 1
     assert "there is no XDF file" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_what_is_sent_again_has_the_time_of_what_it_repeats(seed: int) -> None:
-    """Chunks of other lengths, with a counter that is sent again as well."""
-    random = np.random.default_rng(seed)
-    once = 1000.0 + np.arange(20_000.0) / 250.0
-    at, size = int(random.integers(100, 19_000)), int(random.integers(2, 60))
-    order = np.r_[:at, at - size : at, at:20_000]
-    shown = np.column_stack([once[::500], np.zeros(40), np.full(40, 2e-4)])
-    found = correct(once[order], probes=shown, rate_hz=250.0, counter=order.astype(float))
-    np.testing.assert_allclose(found.time, once[order], atol=1e-6)
-    assert found.quality.repeated == size
-    assert found.quality.dropped == 0
-    assert [(part.start, part.stop) for part in found.segments] == [(0, 20_000 + size)]
-    assert correct(once, probes=shown, rate_hz=250.0).quality.repeated == 0

@@ -24,7 +24,6 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.errors import RecordingError
-from labcrane.streams.sync import repeats
 from labcrane.streams.sync.dejitter import Dejitter, even, even_line, follow_sample_clock, left_open
 from labcrane.streams.sync.epochs import epochs
 from labcrane.streams.sync.placement import LATE_S, PULL_S, Placement, moving, place
@@ -44,7 +43,6 @@ from labcrane.streams.sync.sampling import (
     examine,
     examine_irregular,
 )
-from labcrane.streams.sync.stamping.shifts import MOST_S
 from labcrane.streams.sync.terms import Term, Terms, none_of, total, typical
 from labcrane.types import FloatArray
 
@@ -166,21 +164,7 @@ def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> C
         told[:] = False
     if not told.all():
         return _some_untold(raw, treatment, end, told)
-    of = repeats.first_of(raw.stamps, treatment.rate_hz) if treatment.rate_hz > 0.0 else None
-    shown = len(raw.arrivals) > 0 or raw.sent_again or raw.index is not None
-    if of is None or (not shown and _went_back(raw.stamps)):
-        return _correct(raw, treatment, end)
-    own = of == np.arange(len(of))
-    found = _correct(repeats.left_out(raw, own), treatment, end)
-    where = repeats.place_of(of)
-    time, uneven = found.time[where], found.uneven[where]
-    terms = {name: term[where] for name, term in found.terms.items()}
-    again = int(np.count_nonzero(~own))
-    quality = replace(found.quality, repeated=again)
-    if not shown:  # or its clock was set back, and no sample before or after that is sent again
-        terms[Term.SHIFTS] = terms[Term.SHIFTS] + repeats.back_s(raw.stamps)
-        quality = replace(found.quality, backward=again, **_errors(time, terms, uneven))
-    return Corrected(time, terms, uneven, repeats.put_back(found.segments, own), quality)
+    return _correct(raw, treatment, end)
 
 
 MISSING_S = 1.0
@@ -205,14 +189,6 @@ def as_stated(time: FloatArray, terms: Terms, end: float | None) -> Corrected:
     return Corrected(time, terms, time, quality=quality)
 
 
-def _went_back(stamps: FloatArray) -> bool:
-    """Return whether stamps go back further than any buffer shrinks.
-
-    By whole periods, that looks like samples sent again; only arrivals tell which it is.
-    """
-    return bool((np.diff(stamps) < -MOST_S).any())
-
-
 def _some_untold(
     raw: RawStream, treatment: Treatment, end: float | None, told: npt.NDArray[np.bool_]
 ) -> Corrected:
@@ -220,13 +196,16 @@ def _some_untold(
 
     Those samples are placed by their arrival, which is all that is known of them.
     """
-    rest = repeats.left_out(raw, told)
-    found = correct(rest, treatment, end)
+    found = correct(raw.only(told), treatment, end)
     arrival, count = raw.arrival(), len(raw.stamps)
     time, uneven = (np.full(count, np.nan) for _ in range(2))
     terms = {name: np.zeros(count) for name in found.terms}
     terms[Term.CLOCK][~told] = np.nan if arrival is None else PULL_S + LATE_S
-    segments = repeats.put_back(found.segments, told)
+    where = np.r_[np.flatnonzero(told), count]
+    segments = tuple(
+        replace(each, start=int(where[each.start]), stop=int(where[each.stop]))
+        for each in found.segments
+    )
     if arrival is not None:
         time[~told] = uneven[~told] = arrival[~told] - treatment.latency_s
     if not told.any():

@@ -112,8 +112,6 @@ class Quality:
         Whose clock the stamps are of, where it is not the probed one: "receiver" or "foreign".
     frozen
         Samples of regular streams that repeat the stamp of the one before.
-    repeated
-        Samples of regular streams that were sent again, with the stamp that they had.
     backward
         Samples that are placed before one that came earlier, or where it is, and may be late
         ones or of a clock that was set back.
@@ -163,7 +161,6 @@ class Quality:
     unprobed: int = 0
     whose: str = ""
     frozen: int = 0
-    repeated: int = 0
     backward: int = 0
     ahead_s: float = 0.0
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import RESET, RecordedStream
@@ -47,8 +48,6 @@ class RawStream:
     own_probes
         Those that its own program answered, where ``probes`` are all of its computer's, shape
         ``(n_own, 4)``; else None.
-    sent_again
-        Whether samples that have the stamp of an earlier one are known to have its values too.
     """
 
     stamps: FloatArray
@@ -57,7 +56,6 @@ class RawStream:
     resets: FloatArray = field(default_factory=lambda: _nothing(3))
     index: FloatArray | None = None
     own_probes: FloatArray | None = None
-    sent_again: bool = False
 
     def __post_init__(self) -> None:
         for name, columns in (("probes", 4), ("arrivals", 2), ("resets", 3)):
@@ -83,6 +81,22 @@ class RawStream:
         if len(told) < FEW_ANSWERS:
             return np.inf
         return float(told[-1] + 2.0 * np.diff(told).max())
+
+    def only(self, own: npt.NDArray[np.bool_]) -> "RawStream":
+        """Return the stream of these samples alone."""
+        before = np.r_[0, np.cumsum(own)]
+        arrivals, resets = self.arrivals.copy(), self.resets.copy()
+        if len(arrivals):
+            arrivals[:, 0] = before[np.clip(arrivals[:, 0].astype(int), 0, len(own))]
+        if len(resets):
+            resets[:, 1:] = before[np.clip(resets[:, 1:].astype(int), 0, len(own))]
+        return replace(
+            self,
+            stamps=self.stamps[own],
+            arrivals=arrivals,
+            resets=resets,
+            index=None if self.index is None else self.index[own],
+        )
 
 
 def unwrapped(counts: FloatArray) -> FloatArray | None:
@@ -116,27 +130,12 @@ def raw_of(recorded: RecordedStream) -> RawStream:
         when, offset = recorded.offsets.T
         trips = np.full(len(when), ASSUMED_RTT_S)
         probes = np.column_stack([when - POLL_AGE_S, offset, trips, when + offset])
-    raw = RawStream(
+    return RawStream(
         recorded.time_raw,
         probes=probes,
         arrivals=recorded.arrivals,
         resets=_resets(recorded),
     )
-    return replace(raw, sent_again=_same_values(recorded))
-
-
-def _same_values(recorded: RecordedStream) -> bool:
-    """Whether samples with the stamp of an earlier one have its values, and values change."""
-    stamps, data = recorded.time_raw, recorded.data
-    if len(data) != len(stamps):
-        return False
-    _, first, which = np.unique(stamps, return_index=True, return_inverse=True)
-    again = np.flatnonzero(first[which] != np.arange(len(stamps)))
-    if not len(again):
-        return False
-    values, earlier = data[again], data[first[which[again]]]
-    alike = (values == earlier) | ((values != values) & (earlier != earlier))  # noqa: PLR0124
-    return bool(alike.all() and (values[1:] != values[:-1]).any())
 
 
 def _resets(recorded: RecordedStream) -> FloatArray:

@@ -33,7 +33,6 @@ class Fault(StrEnum):
     COARSE = "stamps cut to a coarse unit"
     SHIFTED = "paused, or delay changed"
     FROZEN = "stamps that stand still"
-    REPEATED = "samples sent again"
     STEPPED = "clock stepped"
     RESTARTED = "restarted"
     SLEPT = "computer slept"
@@ -54,7 +53,6 @@ _FAULTS: dict[Fault, Callable[[Quality, float], bool]] = {
     Fault.NOISY: lambda q, _: q.noise_s > 0.0 and not q.late_stamps,
     Fault.SHIFTED: lambda q, _: q.shifts > 0,
     Fault.FROZEN: lambda q, _: q.frozen > 0,
-    Fault.REPEATED: lambda q, _: q.repeated > 0,
 }
 """Of regular streams only."""
 

@@ -251,9 +251,6 @@ def _order(quality: Quality) -> _Judged:
     if quality.frozen:
         text = f"{quality.frozen} samples have the timestamp of the one before"
         yield Verdict.WARN, text, "exclude the trials they are in; check its program"
-    if quality.repeated:
-        text = f"{quality.repeated} samples were sent again with the same timestamp"
-        yield Verdict.WARN, text, "remove them before you filter or average it"
     if quality.stalls:
         text = f"{quality.stalls} times it stalled and sent late, by "
         text += f"{quality.longest_stall_s:.1f} s at most"
