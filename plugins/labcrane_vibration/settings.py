@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from labcrane import Machine, Settings
-from labcrane.core import Names, SignalName, Unit, Within, WrongKey
+from labcrane.core import ByEstimate, Names, SignalName, Unit, Within, WrongKey
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Degrees = Annotated[float, Field(ge=-180.0, le=180.0)]
@@ -58,6 +58,9 @@ class VibrationSettings(Settings):
 
     amplitude: tuple[Share, Share] = (0.3, 0.9)
     """Amplitude far away and at the target, 0 to 1. Swap the values to reverse the polarity."""
+
+    intensity: Share | ByEstimate = 1.0
+    """Factor of ``amplitude``, 0 to 1. Or one that follows an estimate."""
 
     pulse_hz: tuple[PositiveFloat, PositiveFloat] | None = (1.0, 8.0)
     """Pulses per second far away and at the target; each is half on and half off. Null: without

@@ -8,12 +8,12 @@ import numpy as np
 from pydantic import BaseModel
 
 from labcrane import DeviceError, Feedback, FloatArray, Frame, Run, Signal
-from labcrane.core import SessionState, Value
+from labcrane.core import ByEstimate, Following, SessionState, Value
 from labcrane_vibration.device import Device, opened
 from labcrane_vibration.law import ON, shares, strength
 from labcrane_vibration.settings import VibrationSettings
 
-LIVE = ("far", "amplitude", "pulse_hz", "aside", "silent_after_s")
+LIVE = ("far", "amplitude", "intensity", "pulse_hz", "aside", "silent_after_s")
 """Settings that can change while the device is open."""
 
 ANSWER, ANSWERS = (
@@ -38,12 +38,14 @@ class Vibration(Feedback):
         settings: VibrationSettings,
         open_device: Callable[[VibrationSettings], Device] = opened,
     ) -> None:
+        self._intensity = Following(settings.intensity)
         self.signals = (
             Signal("vibration.amplitude", "1"),
             Signal("vibration.pulse", "Hz"),
             Signal("vibration.level", "1", tuple(settings.tactors)),
             Signal("vibration.command", "1"),  # number of the last command, as in its answer
             Signal("vibration.given", "s"),  # time with vibration so far
+            *self._intensity.signals("vibration.intensity"),
         )
         if settings.driver != "rumble":  # a controller does not answer
             self.streams = {ANSWER: ANSWERS}
@@ -66,6 +68,7 @@ class Vibration(Feedback):
         self._radius = run.task.index("target.radius")
         stimulus = self._settings.stimulus
         self._stimulus = None if stimulus is None else run.task.index(stimulus)
+        self._intensity.open(run.axes)
         self._rate = run.rate_hz
         self._given = None
         self._trial = 0
@@ -84,6 +87,8 @@ class Vibration(Feedback):
         if before != now:
             return False
         self._settings = settings
+        if not isinstance(settings.intensity, ByEstimate):
+            self._intensity = Following(settings.intensity)
         return True
 
     def update(self, situation: SessionState) -> None:
@@ -93,9 +98,11 @@ class Vibration(Feedback):
     def present(self, frame: Frame) -> FloatArray:
         device = self._open()
         amplitude, pulse, wanted = self._felt(frame)
+        part = self._intensity.shown(frame)
         self._count(frame, device)
-        device.set(wanted)
-        return np.array([amplitude, pulse, *device.levels, device.number, self._given])
+        device.set(tuple(part * level for level in wanted))
+        felt = (part * amplitude, pulse, *device.levels, device.number, self._given)
+        return np.array([*felt, *self._intensity.recorded])
 
     def samples(self) -> Mapping[str, FloatArray]:
         found = np.array(self._open().answers()).reshape(-1, len(ANSWERS))

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from tactor_board import serial_board, udp_board
 from virtual_sticks import desk
 
-from labcrane import DeviceError, Feedback, Frame, Run, Tick
+from labcrane import DeviceError, Feedback, Frame, Run, Signal, Tick
 from labcrane.cli.app import main
 from labcrane.core import SessionState, Within
 from labcrane.testing import TARGETS, FeedbackContract, ch8, make_run, make_target
@@ -97,6 +97,18 @@ def test_pulses_are_on_for_half_of_the_time_and_begin_on(run: Run) -> None:
     on = [dues[0], *dues[1:][(np.diff(levels) > 0)]]
     np.testing.assert_allclose(on, np.arange(10) / 5.0, atol=2.1 / run.rate_hz)
     assert np.mean(np.array(levels) > 0.0) == pytest.approx(0.5, abs=0.02)
+
+
+def test_its_intensity_follows_an_estimate_as_a_factor_of_the_amplitude() -> None:
+    run = make_run(ch8(), axes=[Signal("estimate.load.ratio", "")], task=TARGETS)
+    law = {"estimate": "load.ratio", "between": [1, 3], "to": [1, 0.5], "at_most_per_s": 0.5}
+    made = vibrating(run, pulse_hz=None, amplitude=[0.8, 0.8], intensity=law)
+    for elapsed, factor in ((0.0, 1.0), (0.5, 0.75), (2.0, 0.5)):
+        frame = at(run, (1.0, 0.0, 0.0), elapsed, elapsed=elapsed)
+        frame.axes[:] = 4.0
+        amplitude, _, level, *_, recorded = made.present(frame)
+        assert (amplitude, recorded) == pytest.approx((0.8 * factor, factor))
+        assert level == pytest.approx(0.8 * factor, abs=0.01)
 
 
 def test_inside_the_target_it_stops_after_a_moment_and_begins_again_outside(run: Run) -> None:
