@@ -111,7 +111,8 @@ class _Source:
             drifted = abs(clock.offset - last.offset) / (clock.remote_time - last.remote_time)
             self._drift = DRIFT + drifted
         self._clock = clock
-        self.error_s = clock.rtt / 2.0 + self._drift * (time.perf_counter() - clock.local)
+        since = time.perf_counter() - (clock.remote_time + clock.offset)
+        self.error_s = clock.rtt / 2.0 + self._drift * since
         return np.array(stamps) + (clock.offset - self._latency_s), np.array(samples, np.float64)
 
     def close(self) -> None:
