@@ -1,6 +1,4 @@
-"""Lapses of a simulated operator: when it bumps, presses on, and how tired it is."""
-
-import math
+"""Lapses of a simulated operator: when it bumps and presses on."""
 
 import numpy as np
 
@@ -31,19 +29,13 @@ class Lapses:
         self._press = round(settings.over_grip_s * rate_hz)
         self._bump_left = self._press_left = 0  # ticks
         self._held = False
-        self._sense = 1.0
         looks = np.random.default_rng([*seeds, 0x5EE])
         self.overlooks = bool(looks.random() < settings.misses)
         self.imagines = bool(looks.random() < settings.false_reports)
 
-    def tire(self, since_start: float) -> float:
-        """Take the session's time in s; return which share of its speed the operator still has."""
-        self._sense = math.exp(-self._settings.fatigue_per_min * since_start / SECONDS)
-        return self._sense
-
     def sinks(self) -> float:
         """Take a tick in which the arm is moved; return how fast it is let sink, in m/s."""
-        rate = self._settings.bumps_per_min / SECONDS / self._sense
+        rate = self._settings.bumps_per_min / SECONDS
         if self._random.random() < rate * self._dt and self._bump_left == 0:
             self._bump_left = self._bump
         if self._bump_left == 0:
@@ -53,10 +45,8 @@ class Lapses:
 
     def presses_on(self, *, held: bool) -> bool:
         """Take whether something is in the grip; return whether the jaws go on to be shut."""
-        if held and not self._held:
-            chance = min(1.0, self._settings.over_grip / self._sense)
-            if self._random.random() < chance:
-                self._press_left = self._press
+        if held and not self._held and self._random.random() < self._settings.over_grip:
+            self._press_left = self._press
         self._held = held
         if not held or self._press_left == 0:
             return False

@@ -77,7 +77,6 @@ class ScenarioOperator(InputDevice):
         columns = run.state.columns
         self._grip = columns.index("grip.thing") if "grip.thing" in columns else None
         self._wait = 0
-        self._first: float | None = None
         self._lapses: Lapses | None = None
 
     def begin_trial(self, trial: Trial) -> None:
@@ -103,18 +102,14 @@ class ScenarioOperator(InputDevice):
             return out
         away = seen.task[self._target] - seen.state[self._tip]
         distance = float(np.linalg.norm(away))
-        if self._first is None:
-            self._first = tick.due
         lapses = self._lapses
-        fresh = 1.0 if lapses is None else lapses.tire(tick.due - self._first)
         radius = seen.task.item(self._radius)
         touch = -1.0 if self._touch is None else seen.task.item(self._touch)
         if touch == 0.0 or (touch < 0.0 and distance > NEAR * radius):
             settings = self._settings
             gently = touch == 0.0 and distance < GENTLE * radius
             fastest = TOUCH_M_S if gently else settings.speed_m_s
-            speed = fresh * min(settings.gain_per_s * distance, fastest)
-            asked = away / distance * speed
+            asked = away / distance * min(settings.gain_per_s * distance, fastest)
             if lapses is not None and (sinking := lapses.sinks()):
                 asked = np.array([0.0, 0.0, -sinking])
             out[:] = self._run.inverse(asked, seen.state)

@@ -84,10 +84,6 @@ class ErrorSettings(Settings):
     false_reports: float = Field(default=0.0, ge=0.0, le=1.0)
     """Probability, for each trial without a deformity, of reporting one at the first goal."""
 
-    fatigue_per_min: Annotated[NonNegativeFloat, Usual(1e-5, 1.0)] = 0.0
-    """Loss of speed per minute of the session, which also raises the rates of errors: after t
-    minutes, the speed is multiplied by exp(-fatigue t), and the rates are divided by it."""
-
 
 class PanelOperatorSettings(Settings):
     """A simulated operator at a control panel. Its values are assumed, not measured."""

@@ -46,17 +46,6 @@ def test_a_grip_is_pressed_on_with_its_probability_and_once(random: np.random.Ge
     assert abs(often - 600 * share) < 4.0 * math.sqrt(600 * share * (1 - share))
 
 
-@pytest.mark.slow
-def test_with_time_it_gets_slower_and_errs_more_often() -> None:
-    settings = ErrorSettings(bumps_per_min=2.0, bump_s=0.05, fatigue_per_min=0.1)
-    lapses = Lapses(settings, RATE_HZ, (3, 4))
-    assert lapses.tire(0.0) == 1.0
-    fresh = bumps(lapses, 3600.0)
-    assert lapses.tire(600.0) == pytest.approx(math.exp(-1.0))
-    tired = bumps(lapses, 3600.0)
-    assert tired / fresh == pytest.approx(math.e, rel=0.35)
-
-
 def test_deformities_are_overlooked_and_imagined_with_their_probabilities() -> None:
     settings = ErrorSettings(misses=0.3, false_reports=0.1)
     drawn = [Lapses(settings, RATE_HZ, (5, seed)) for seed in range(2000)]
