@@ -23,8 +23,8 @@ from needs import need, not_tried
 from once import RUN_FOLDER
 from port_block import claim
 
-from labcrane.registry.registry import Registry, discover
 from labcrane.streams.network import LOOPBACK
+from labcrane.testing import Registry, discover
 
 _FOLDER = Path(tempfile.mkdtemp(prefix="labcrane-tests-"))
 atexit.register(shutil.rmtree, _FOLDER, ignore_errors=True)

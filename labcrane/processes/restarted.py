@@ -17,7 +17,7 @@ class RestartedProcess(ProcessHandle):
     Parameters
     ----------
     order
-        What each process gets first.
+        The first message to each process.
     longest_pause_s
         Each pause before a start is twice the last one, up to this.
 

@@ -61,12 +61,12 @@ class Study:
         The components chosen; ``operator`` takes the place of ``input`` in a simulation.
     choices
         All components but the operator, by the part they play: ``scheme``, ``tasks.NAME``.
-    tasks
+    tasks, task_choices
         The tasks by the protocol's names for them, built, with the secondary tasks beside them.
     secondary
         What runs beside the tasks, by the protocol's names.
-    questionnaires
-        The questionnaires by the study's names for them, built.
+    questionnaires, questionnaire_choices
+        The questionnaires by the study's names for them, built, and what they are built from.
     cues, sounds, views
         What presents the session to people, by the protocol's names: cues and sounds are switched
         on block by block, views are always there.

@@ -54,13 +54,16 @@ KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One order as it was given, with its words if it has any; :func:`read_request` reads it."""
+    """One order as it was given, with its text if it has any; :func:`read_request` reads it."""
 
     order: Order
     text: str = ""
-    by: str = ""  # which page; empty for the terminal
-    at: str = ""  # the address from which a page asked
+    by: str = ""
+    """Which page; empty for the terminal."""
+    at: str = ""
+    """The address from which a page asked."""
     kind: Literal["command"] = "command"
+    """What messages to a session are told apart by."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -385,6 +388,7 @@ class QueueConsole:
         self._orders.put(command)
 
     def commands(self) -> list[Command]:
+        """Return the orders that were given since the last call."""
         if self._orders.empty():  # the usual tick
             return []
         given = []
@@ -393,6 +397,7 @@ class QueueConsole:
         return given
 
     def report(self, event: Event) -> None:
+        """Put an event into the queue, and hand it to each listener."""
         self.events.put(event)
         for listen in self.listeners:
             listen(event)

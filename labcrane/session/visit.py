@@ -28,6 +28,8 @@ class Visit:
 
     Attributes
     ----------
+    study
+        The study, as read from its protocol.
     participant, session
         Who, and which of the protocol's sessions, counted from 1.
     data

@@ -25,7 +25,6 @@ from labcrane.analysis.scoring.operator_tests import (
     operator_tests,
 )
 from labcrane.analysis.scoring.settings import IndicatorSettings, Weights
-from labcrane.cli.app import main
 from labcrane.cli.commands.results import LEFT_OUT
 from labcrane.core import Event
 from labcrane.participants.enrolment import exclude
@@ -33,6 +32,7 @@ from labcrane.participants.folders import Places
 from labcrane.participants.register import Entry, changed
 from labcrane.recording.journal import Column, SessionJournal
 from labcrane.recording.participant_file.writer import consolidate
+from labcrane.testing import main
 
 LITERAL = IndicatorSettings()
 UNCAPPED = IndicatorSettings(capped=False)

@@ -11,15 +11,13 @@ from rehearsal import SHORT, said_of
 
 from labcrane import ProtocolError
 from labcrane.approval.materials import materials
-from labcrane.design.plan import plan_session
 from labcrane.design.quest_plus import grid
 from labcrane.files.units import KINDS, in_unit
 from labcrane.protocol.questions import PLAUSIBLE, questions
 from labcrane.protocol.streams import TimeLimits
-from labcrane.protocol.study import load
 from labcrane.protocol.tracks import QuestPlus
-from labcrane.registry.registry import Registry
 from labcrane.simulation.rehearsal import rehearse
+from labcrane.testing import Registry, load, plan_session
 
 FED = SHORT.replace("sessions:", "feedback: {ball: {use: sphere}}\nsessions:")
 

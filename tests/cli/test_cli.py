@@ -11,9 +11,9 @@ from rehearsal import SHORT, simulated_file
 from rich.console import Console
 
 import labcrane
-from labcrane.cli.app import main
 from labcrane.cli.output import out, print_rows
 from labcrane.registry import LAB
+from labcrane.testing import main
 
 ROOT = Path(__file__).parents[2]
 AIMING = ROOT / "protocols" / "aiming" / "protocol.yaml"

@@ -4,8 +4,9 @@ import re
 
 import pytest
 
-from labcrane.cli.app import MODULES, main
+from labcrane.cli.app import MODULES
 from labcrane.cli.help import SECTIONS, plain, sections
+from labcrane.testing import main
 
 
 def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:

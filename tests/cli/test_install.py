@@ -8,8 +8,7 @@ import pytest
 from fresh_environment import run
 
 import labcrane
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
+from labcrane.testing import discover, load
 
 ROOT = Path(__file__).parents[2]
 BEFORE = ROOT / "tests" / "recording" / "before"

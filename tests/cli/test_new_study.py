@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from needs import need
 
-from labcrane.cli.app import main
 from labcrane.cli.shipped import shipped_studies
+from labcrane.testing import main
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = ("aiming", "crane_pilot", "crossover", "pre_post", "retrieval", "washout", "whole")

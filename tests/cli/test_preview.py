@@ -11,7 +11,7 @@ from rehearsal import ScriptedConsole, a_study
 import labcrane
 from labcrane import Feedback, ProtocolError
 from labcrane.feedback.preview import movement, write_preview
-from labcrane.session.session import Visit, run
+from labcrane.testing import Visit, run
 
 PREVIEWED = FED.replace("distances: [2]", "distances: [2], limit_s: 1") + (
     "views: {operator: {use: view, renderer: software, size: [160, 90]}}\n"

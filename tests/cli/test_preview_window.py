@@ -13,8 +13,8 @@ from programs import ran
 from rehearsal import SHORT
 from windows import an_x_server
 
-from labcrane.cli.app import main
 from labcrane.streams.feedback_log import log_name
+from labcrane.testing import main
 
 STUDY = (
     SHORT

@@ -20,7 +20,7 @@ from labcrane import open_recording
 from labcrane.cli.terminal import Terminal
 from labcrane.core import Event, Item
 from labcrane.design.counts import TrialCounts
-from labcrane.session.commands import Command, Order, QueueConsole
+from labcrane.testing import Command, Order, QueueConsole
 from labcrane.web.translations import WORDS
 
 

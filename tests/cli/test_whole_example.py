@@ -7,7 +7,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from labcrane import open_recording
-from labcrane.cli.app import main
+from labcrane.testing import main
 
 WHOLE = Path(__file__).parents[2] / "protocols" / "whole"
 STEPS = (

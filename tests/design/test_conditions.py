@@ -12,10 +12,8 @@ from rehearsal import DiesError, DiesInTrial, ScriptedConsole, a_study
 import labcrane
 from labcrane import ProtocolError
 from labcrane.design.allocation import allocate, balance
-from labcrane.design.plan import plan_session
 from labcrane.protocol.questions import questions
-from labcrane.protocol.study import Study
-from labcrane.session.session import Visit, run
+from labcrane.testing import Study, Visit, plan_session, run
 
 HEAD, _, _ = FED.partition("design:")
 ASIDE = "  aside: {use: sonification, far: 3.0}\n"

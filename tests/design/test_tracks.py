@@ -233,7 +233,7 @@ def test_what_cannot_be_is_refused_with_its_line(
 
 
 def test_a_round_under_way_keeps_its_level(tmp_path: Path) -> None:
-    from labcrane.design.plan import plan_session
+    from labcrane.testing import plan_session
 
     path = tmp_path / "protocol.yaml"
     path.write_text(HEAD)
@@ -260,7 +260,7 @@ def test_no_table_of_quest_plus_is_made_at_a_choice(
 ) -> None:
     """Whoever plans a session makes it: in the loop it would take as long as a tick."""
     from labcrane.design import quest_plus
-    from labcrane.design.plan import plan_session
+    from labcrane.testing import plan_session
 
     quest_plus.grid.cache_clear()
     path = tmp_path / "protocol.yaml"

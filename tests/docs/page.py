@@ -43,7 +43,7 @@ from ruamel.yaml import YAML
 from simple_crane import CRANE
 from windows import an_x_server
 
-from labcrane.cli.app import main
+from labcrane.testing import main
 
 ROOT = Path(__file__).parents[2]
 

@@ -10,11 +10,9 @@ import pytest
 from docs.page import ROOT, program
 from needs import need
 
-from labcrane.cli.app import main
 from labcrane.protocol.protocol import protocol_model
-from labcrane.protocol.study import load
 from labcrane.registry.hookspecs import ROLES
-from labcrane.registry.registry import discover
+from labcrane.testing import discover, load, main
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,9 @@ from windows import an_x_server
 
 from labcrane import Offer, Settings
 from labcrane.analysis.presented import PresentedLimits
-from labcrane.cli.app import main
 from labcrane.core import Finding, Verdict
 from labcrane.feedback.picture_rate import judged
-from labcrane.testing import ExaminationContract
+from labcrane.testing import ExaminationContract, main
 from labcrane_can import labcrane_inputs
 from labcrane_can.avc import encode
 from labcrane_can.examination import examine

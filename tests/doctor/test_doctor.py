@@ -12,17 +12,13 @@ from rehearsal import SHORT, ScriptedConsole
 
 import labcrane
 from labcrane import RecordingError
-from labcrane.cli.app import main
 from labcrane.core import Finding, Verdict
 from labcrane.doctor import check_process, components
 from labcrane.doctor.checks import examine, keep_apart
 from labcrane.doctor.components import ExaminedPart, of_everything, of_study, unexamined
 from labcrane.doctor.report import Check, diagnosis, keep, latest
 from labcrane.processes.handle import ProcessHandle
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
-from labcrane.session.commands import Command, Order
-from labcrane.session.session import Visit, run
+from labcrane.testing import Command, Order, Visit, discover, load, main, run
 
 AIMING = Path(__file__).parents[2] / "protocols" / "aiming" / "protocol.yaml"
 

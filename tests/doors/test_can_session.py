@@ -10,9 +10,8 @@ import pytest
 from rehearsal import a_study
 
 from labcrane import open_recording
-from labcrane.session.commands import Command, Order
 from labcrane.session.session import finish, record
-from labcrane.session.visit import Visit
+from labcrane.testing import Command, Order, Visit
 from labcrane_can.command_state import PanelCommands
 
 JOINTS = ("slew", "shoulder", "elbow", "wrist")

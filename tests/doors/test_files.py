@@ -16,11 +16,10 @@ from doors.fuzz import BUSY_S, MOST_BYTES, MOST_S
 from results.recorded import record, study
 
 from labcrane import LabcraneError, RecordingError, open_recording
-from labcrane.cli.app import main
 from labcrane.recording.participant_file.containment import DEEPEST
 from labcrane.recording.participant_file.recover import recover
 from labcrane.recording.xdf.reader import XdfFile, read_xdf
-from labcrane.session.commands import Command, Order
+from labcrane.testing import Command, Order, main
 
 SEAL_BYTES = 32
 

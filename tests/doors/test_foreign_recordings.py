@@ -12,10 +12,10 @@ from rehearsal import simulated_file
 from results.recorded import STUDY, record, study
 
 from labcrane import RecordingError, open_recording
-from labcrane.cli.app import main
 from labcrane.feedback import playback
 from labcrane.processes.handle import ProcessHandle
 from labcrane.replay.restore import restore
+from labcrane.testing import main
 
 EVIL = "from pathlib import Path\nPath({mark!r}).write_text('ran')\nraise ImportError('evil')\n"
 

@@ -18,13 +18,10 @@ from labcrane.core import AnswerError
 from labcrane.files.yaml import parse_yaml
 from labcrane.limits import LIMITS, LimitError
 from labcrane.machines import MeshError, read_surface
-from labcrane.protocol.study import Study
 from labcrane.recording import StreamHeader
 from labcrane.recording.xdf.reader import read_xdf
 from labcrane.session.commands import (
-    Command,
     MessageError,
-    Order,
     SettingChange,
     beyond_limits,
     decode,
@@ -33,7 +30,7 @@ from labcrane.session.commands import (
 from labcrane.session.commands import encode as encode_message
 from labcrane.session.live_settings import FeedbackSettings
 from labcrane.session.questionnaire import QuestionnaireForm
-from labcrane.testing import ch8
+from labcrane.testing import Command, Order, Study, ch8
 from labcrane_bids.dataset import people_table
 from labcrane_can.command_state import PanelCommands
 from labcrane_can.dbc import signal_names

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from results.recorded import record, study
 
-from labcrane.cli.app import main
+from labcrane.testing import main
 
 COMMANDS = {
     "report": ("report",),

@@ -13,9 +13,9 @@ from rehearsal import SHORT, a_study, rehearse
 from labcrane.core import AnswerError, Item
 from labcrane.limits import LIMITS, LimitError, check_text, read_json
 from labcrane.participants.personal_data import personal
-from labcrane.protocol.study import Study
-from labcrane.session.commands import KINDS, Command, Order, QueueConsole, beyond_limits
+from labcrane.session.commands import KINDS, beyond_limits
 from labcrane.session.questionnaire import QuestionnaireForm
+from labcrane.testing import Command, Order, QueueConsole, Study
 
 QUESTIONS = """\
 questionnaires:

@@ -15,11 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from labcrane import ProtocolError
-from labcrane.cli.app import main
 from labcrane.core import read_yaml
 from labcrane.files.yaml import YamlFile, parse_yaml
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
+from labcrane.testing import discover, load, main
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 

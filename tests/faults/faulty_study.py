@@ -7,13 +7,10 @@ import numpy as np
 from rehearsal import ScriptedConsole
 
 from labcrane import open_recording
-from labcrane.protocol.study import load
 from labcrane.recording import SessionRecord
 from labcrane.recording.frame_log import FrameLog
-from labcrane.registry.registry import discover
 from labcrane.session import session as session_module
-from labcrane.session.commands import Command, Order
-from labcrane.session.session import Visit, run
+from labcrane.testing import Command, Order, Visit, discover, load, run
 
 STUDY = """\
 labcrane: 1

@@ -8,8 +8,8 @@ from jack_server import a_jack_server, underruns
 from labcrane import open_recording
 from labcrane.launcher.launcher import Launcher
 from labcrane.recording import SessionRecord
-from labcrane.session.commands import QueueConsole
 from labcrane.session.visit import visit_of
+from labcrane.testing import QueueConsole
 
 
 class Examiner(QueueConsole):

@@ -11,8 +11,8 @@ from rehearsal import SHORT, ScriptedConsole, a_study
 from labcrane import RecordingError
 from labcrane.limits import LIMITS
 from labcrane.recording import frame_log
-from labcrane.session.commands import Command, Order
-from labcrane.session.session import Visit, record
+from labcrane.session.session import record
+from labcrane.testing import Command, Order, Visit
 
 SESSION = """
 import sys

@@ -15,8 +15,8 @@ import labcrane as lab
 from labcrane.core import Event
 from labcrane.launcher.launcher import Launcher
 from labcrane.recording import SessionRecord
-from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.visit import visit_of
+from labcrane.testing import Command, Order, QueueConsole
 
 STUDY = (
     """\

@@ -9,7 +9,7 @@ from simple_crane import FORM
 
 import labcrane as lab
 from labcrane.core import Event
-from labcrane.session.commands import Command, Order
+from labcrane.testing import Command, Order
 
 STUDY = (
     """\

@@ -11,8 +11,8 @@ from simple_crane import FORM
 import labcrane as lab
 from labcrane.feedback.handle import ATTEMPTS, SILENT_S
 from labcrane.launcher.launcher import Launcher
-from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.visit import visit_of
+from labcrane.testing import Command, Order, QueueConsole
 
 STUDY = (
     """\

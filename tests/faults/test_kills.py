@@ -20,11 +20,9 @@ from faults.sessions import a_witness, labcrane, program, unique, wait_for, witn
 from simple_crane import FORM
 
 from labcrane import open_recording
-from labcrane.design.plan import plan_session
-from labcrane.protocol.study import load
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
 from labcrane.recording.paths import parts
-from labcrane.registry.registry import discover
+from labcrane.testing import discover, load, plan_session
 
 STUDY = (
     """\

@@ -14,8 +14,8 @@ from labcrane import DeviceError
 from labcrane.feedback import handle
 from labcrane.feedback.processes import FeedbackProcesses
 from labcrane.launcher.launcher import Launcher
-from labcrane.session.commands import QueueConsole
-from labcrane.session.visit import Visit, visit_of
+from labcrane.session.visit import visit_of
+from labcrane.testing import QueueConsole, Visit
 
 PLUGIN = '''
 import os

@@ -12,7 +12,7 @@ from windows import an_x_server
 
 from labcrane import DeviceError
 from labcrane.feedback.processes import FeedbackProcesses
-from labcrane.session.session import Visit
+from labcrane.testing import Visit
 
 STUDY = """\
 feedback:

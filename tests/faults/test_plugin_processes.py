@@ -17,13 +17,12 @@ from faults.faulty_study import (
 )
 
 from labcrane import LabcraneError, open_recording
-from labcrane.cli.app import main
 from labcrane.feedback import handle as feedback_handle
 from labcrane.launcher import hang_detector
 from labcrane.launcher.launcher import Launcher, Outcome
 from labcrane.recording import SessionRecord
-from labcrane.session.commands import QueueConsole
 from labcrane.session.visit import visit_of
+from labcrane.testing import QueueConsole, main
 
 
 @pytest.mark.long

@@ -9,10 +9,7 @@ from faults.faulty_study import CASES, RUNNING, Spoil, line_of, recorded, run_ag
 from rehearsal import ScriptedConsole
 
 from labcrane import PluginError
-from labcrane.cli.app import main
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
-from labcrane.session.session import Visit, run
+from labcrane.testing import Visit, discover, load, main, run
 
 
 @pytest.mark.slow

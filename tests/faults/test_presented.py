@@ -24,9 +24,9 @@ from labcrane.analysis.quality import exclusions, is_result
 from labcrane.core import Event
 from labcrane.launcher.launcher import Launcher
 from labcrane.launcher.pages import left_behind
-from labcrane.session.commands import Command, Order, QueueConsole
-from labcrane.session.visit import Visit, visit_of
+from labcrane.session.visit import visit_of
 from labcrane.streams.recorder.process import STATUS_S
+from labcrane.testing import Command, Order, QueueConsole, Visit
 from labcrane.web.control_room.condition import ExpectedSession, Lamp, lamp_of
 from labcrane.web.state import SessionView
 from labcrane_tables.settings import TableSettings

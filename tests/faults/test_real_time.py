@@ -11,8 +11,8 @@ from needs import needs
 from programs import ran
 
 from labcrane import open_recording
-from labcrane.cli.app import main
 from labcrane.processes.real_time import PRIORITY
+from labcrane.testing import main
 
 STAT_PRIORITY, STAT_POLICY = 39, 40
 """Fields of /proc/PID/stat, counted from 0, by proc(5): rt_priority and policy."""

@@ -11,7 +11,7 @@ from needs import needs
 from simple_crane import FORM
 
 from labcrane.core import Event
-from labcrane.session.commands import Command, Order
+from labcrane.testing import Command, Order
 
 STUDY = (
     """\

@@ -17,13 +17,12 @@ from rehearsal import SHORT, a_study
 from tactor_board import serial_board
 
 from labcrane import DeviceError, ProtocolError, StreamError
-from labcrane.cli.app import main
 from labcrane.cli.commands.delay import measure_delay
 from labcrane.feedback.delays import delay_in_words, delay_path, read_delays
 from labcrane.feedback.measure_delay import measure
 from labcrane.feedback.processes import FeedbackProcesses
-from labcrane.session.session import Visit
 from labcrane.streams.edges import Change, delay, onsets, steps
+from labcrane.testing import Visit, main
 
 STUDY = (
     SHORT

@@ -13,14 +13,11 @@ import labcrane
 from labcrane import ProtocolError, Signal
 from labcrane.core import Event, Layout, SessionState, TargetFinder
 from labcrane.design.order import faded
-from labcrane.design.plan import plan_session
 from labcrane.protocol.questions import CheckQuestion, questions
-from labcrane.protocol.study import Study
 from labcrane.recording.run_codec import read_run, write_run
-from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Order
-from labcrane.session.session import Visit, run
+from labcrane.session.commands import FeedbackLost, FeedbackReady
 from labcrane.streams.context import situation_after
-from labcrane.testing import TARGETS, ch8, make_run
+from labcrane.testing import TARGETS, Command, Order, Study, Visit, ch8, make_run, plan_session, run
 
 
 def blocks(*written: str) -> str:

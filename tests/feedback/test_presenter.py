@@ -11,8 +11,7 @@ from labcrane import Feedback, Settings, Signal, offer
 from labcrane.core import Cylinder, SessionState, Sphere
 from labcrane.feedback.config import ComponentConfig, FeedbackConfig
 from labcrane.feedback.presenter import Presenter
-from labcrane.registry.registry import discover
-from labcrane.testing import TARGETS, ch8, make_run, make_target
+from labcrane.testing import TARGETS, ch8, discover, make_run, make_target
 
 
 class Plain(Settings):

@@ -19,12 +19,12 @@ from labcrane.analysis.report.workbook import write_csv, write_workbook
 from labcrane.analysis.scoring.indicator import Performance, indicate
 from labcrane.analysis.scoring.operator_tests import OperatorTest
 from labcrane.analysis.scoring.settings import IndicatorSettings
-from labcrane.cli.app import main
 from labcrane.cli.commands import simulate
 from labcrane.participants import recovery, written_about
 from labcrane.participants.folders import Places
 from labcrane.participants.products import product
 from labcrane.participants.register import read
+from labcrane.testing import main
 
 PEOPLE = ("P001", "P0011", "VP-001")
 """Each name, or its number, is a part of another."""

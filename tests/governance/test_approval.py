@@ -11,8 +11,8 @@ from governed import PERSON, TODAY, Lab, edit
 from labcrane import InputDevice, ProtocolError
 from labcrane.approval.decision import Grant, amend, approve
 from labcrane.approval.lock import lock_path, read_lock
-from labcrane.registry.registry import discover
 from labcrane.session.eligibility import EXEMPT, check_eligibility
+from labcrane.testing import discover
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_pilots_run_whatever_has_drifted_and_stamp_it(lab: Lab) -> None:
     from rehearsal import ScriptedConsole
 
     import labcrane
-    from labcrane.session.session import run
+    from labcrane.testing import run
 
     edit(lab.protocol, "movements: 1", "movements: 2")
     path = run(lab.visit("P001", pilot=True, simulated=True, fast=True), ScriptedConsole())

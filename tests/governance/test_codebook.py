@@ -16,10 +16,8 @@ from labcrane import ProtocolError
 from labcrane.approval.decision import Grant, amend
 from labcrane.approval.lock import lock_path, read_lock
 from labcrane.approval.methods import methods
-from labcrane.cli.app import main
 from labcrane.design.allocation import allocate, as_csv, balance
-from labcrane.design.plan import plan_session
-from labcrane.session.session import Visit, run
+from labcrane.testing import Visit, main, plan_session, run
 
 FACTORS = (
     GROUPED.replace("distances: [2]", "distances: [2, 3]")

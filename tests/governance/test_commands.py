@@ -11,9 +11,9 @@ from governed import GOVERNED, TODAY, put_stand_in
 from programs import ran
 
 import labcrane
-from labcrane.cli.app import main
 from labcrane.participants.folders import Places
 from labcrane.participants.register import Entry, changed
+from labcrane.testing import main
 
 
 @pytest.fixture

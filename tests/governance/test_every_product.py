@@ -25,11 +25,11 @@ from needs import GRAPHICS, missing, needs
 from programs import ran
 
 from labcrane.analysis import Exporter
-from labcrane.cli.app import COMPLETING, commands, main
+from labcrane.cli.app import COMPLETING, commands
 from labcrane.participants import recovery
 from labcrane.participants.copies import inventory
 from labcrane.participants.register import read
-from labcrane.registry.registry import discover
+from labcrane.testing import discover, main
 
 KILLED = pytest.mark.parametrize(
     ("numbers", "least"),

@@ -13,14 +13,13 @@ from needs import needs
 from once import made_once
 
 from labcrane import ProtocolError, RecordingError
-from labcrane.cli.app import main
 from labcrane.participants import enrolment
 from labcrane.participants import recovery as unfinished
 from labcrane.participants.copies import inventory
 from labcrane.participants.deviations import all_deviations
 from labcrane.participants.folders import Places
 from labcrane.participants.register import changed, read
-from labcrane.session.commands import Command, Order
+from labcrane.testing import Command, Order, main
 
 SITES = ("hamburg", "dortmund", "aachen")
 

@@ -15,16 +15,13 @@ from needs import needs
 
 import labcrane
 from labcrane import DeviceError, ProtocolError
-from labcrane.cli.app import main
 from labcrane.launcher import launcher
 from labcrane.participants import enrolment
 from labcrane.participants.deviations import all_deviations
 from labcrane.participants.personal_data import personal
 from labcrane.participants.register import changed, read
-from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.eligibility import check_eligibility
-from labcrane.session.session import run
-from labcrane.session.visit import Visit
+from labcrane.testing import Command, Order, QueueConsole, Visit, main, run
 
 TWO_SESSIONS = GOVERNED + (
     "  - name: retention\n    after_days: [1, 3]\n    steps:\n"
@@ -141,7 +138,7 @@ def test_the_deviations_of_a_session_that_was_killed_come_from_its_journal(lab: 
     lab.consent("P001")
     child = os.fork()
     if child == 0:
-        from labcrane.session.session import run
+        from labcrane.testing import run
 
         class Killer(Willing):
             def commands(self):
@@ -282,7 +279,7 @@ def test_people_need_joysticks_and_leave_no_session_when_there_are_none(tmp_path
     lab = Lab(tmp_path, GOVERNED.replace(PERSON, "{use: dual_joystick}"))
     lab.approve()
     lab.consent("P001")
-    from labcrane.session.session import run
+    from labcrane.testing import run
 
     with desk(), pytest.raises(DeviceError, match="joystick"):
         run(lab.visit("P001"), Willing())

@@ -17,14 +17,12 @@ from faults.sessions import STUDY, finished, kill_all, labcrane, wait_for
 from governance.test_commands import Terminal
 from rehearsal import ScriptedConsole, loaded
 
-from labcrane.cli.app import main
 from labcrane.cli.problem_report import EVENTS, places
 from labcrane.core import Event, Finding, Verdict
 from labcrane.doctor.report import Check
 from labcrane.recording.crash_marker import crash_marker_path, read_crash_marker
 from labcrane.recording.journal import Column, SessionJournal
-from labcrane.session.commands import Command, Order
-from labcrane.session.session import Visit, run
+from labcrane.testing import Command, Order, Visit, main, run
 
 FOLDER, PERSON, HOST, USER = "Zwiebel Labor", "QX417", "hexenhaus-7", "qbertuser"
 NOTE, AMPLIFIER = "hums a tune", "amplifier-pc-3"

@@ -18,11 +18,11 @@ import pytest
 from governance.kept_people import REASON
 from governed import TODAY, Lab
 
-from labcrane.cli.app import main
 from labcrane.participants import proof
 from labcrane.participants import recovery as unfinished
 from labcrane.participants.mentions import Mentions
 from labcrane.participants.proof import mentioned, searched
+from labcrane.testing import main
 
 NAMES = Mentions(["P001", "P0011", "VP-7", "007"])
 NOTE = b"ask P007 about the second session"

@@ -13,9 +13,9 @@ from labcrane import ProtocolError
 from labcrane.approval.decision import amend, verify
 from labcrane.approval.lock import Lock, lock_path, read_lock
 from labcrane.approval.materials import content
-from labcrane.cli.app import main
 from labcrane.cli.consent import missing_consent
 from labcrane.session.eligibility import check_eligibility
+from labcrane.testing import main
 
 OTHER = "I take part, and cannot stop.\n"
 

@@ -10,9 +10,7 @@ from labcrane.approval.decision import Grant, approve
 from labcrane.approval.lock import Lock
 from labcrane.participants.enrolment import confirm_consent
 from labcrane.participants.folders import Places
-from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import Registry, discover
-from labcrane.session.session import Visit, run
+from labcrane.testing import Registry, Study, Visit, discover, load, run
 
 TODAY = date.today()
 PERSON = "{use: stand_in}"
@@ -117,7 +115,7 @@ class Willing(ScriptedConsole):
         self._waits = self._waits or event.name == "waiting"
 
     def commands(self):
-        from labcrane.session.commands import Command, Order
+        from labcrane.testing import Command, Order
 
         start = [Command(Order.START)] * self._waits
         self._waits = False

@@ -8,16 +8,12 @@ from pathlib import Path
 from simple_crane import CRANE
 
 from labcrane import Frame, ProtocolError, Run
-from labcrane.cli.app import main
 from labcrane.core import Event
 from labcrane.core.clock import Clock, ManualClock
-from labcrane.design.plan import plan_session
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import Registry, discover
 from labcrane.session import loop
-from labcrane.session.commands import Command
 from labcrane.session.sequencer import Sequencer
+from labcrane.testing import Command, Registry, Study, discover, load, main, plan_session
 
 SHORT = (
     """\

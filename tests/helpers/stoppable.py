@@ -14,7 +14,7 @@ from labcrane.protocol.evaluation import StopRule
 from labcrane.protocol.protocol import OnFault
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.steps import Block, Session, Step
-from labcrane.protocol.study import Study
+from labcrane.testing import Study
 
 OUTCOMES = (Phase.SUCCESS, Phase.SUCCESS, Phase.FAILURE, Phase.TIMEOUT)
 

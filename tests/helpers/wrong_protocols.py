@@ -19,7 +19,7 @@ from labcrane.protocol.pages import PageSettings
 from labcrane.protocol.protocol import OnFault, Participants
 from labcrane.protocol.streams import StreamNeed, TimeLimits
 from labcrane.registry.hookspecs import ROLES
-from labcrane.registry.registry import Registry
+from labcrane.testing import Registry
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 

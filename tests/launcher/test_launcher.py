@@ -11,11 +11,12 @@ from faults.sessions import STUDY, unique, wait_for
 from labcrane import open_recording
 from labcrane.launcher import launcher as launcher_module
 from labcrane.launcher.launcher import Launcher
-from labcrane.session.commands import Command, Order, QueueConsole, StreamConfirmed
+from labcrane.session.commands import StreamConfirmed
 from labcrane.session.visit import visit_of
 from labcrane.streams.recorder import handle as recorder_handle
 from labcrane.streams.recorder.candidates import answered
 from labcrane.streams.recorder.handle import RecorderHandle
+from labcrane.testing import Command, Order, QueueConsole
 
 
 class LateRecorder:

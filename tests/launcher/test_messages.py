@@ -16,12 +16,10 @@ from labcrane.launcher import session_handle
 from labcrane.launcher.session_handle import MOST_WAITING, SessionHandle
 from labcrane.session.commands import (
     MOST_BYTES,
-    Command,
     FeedbackLost,
     FeedbackReady,
     LauncherGone,
     MessageError,
-    Order,
     StreamBack,
     StreamConfirmed,
     StreamLost,
@@ -29,6 +27,7 @@ from labcrane.session.commands import (
     decode,
     encode,
 )
+from labcrane.testing import Command, Order
 
 # Names and reasons with colons, quotes and whatever else a text may hold.
 WORDS = st.text(st.characters(exclude_categories=("Cs",)), max_size=200)

@@ -282,7 +282,7 @@ def test_a_study_on_an_excavator_of_an_mjcf_file_is_checked_run_and_replayed(
 ) -> None:
     from needs import need
 
-    from labcrane.cli.app import main
+    from labcrane.testing import main
 
     need("mujoco", *(["pybullet"] if engine == "bullet_crane" else []))
     folder = tmp_path / "study"

@@ -13,7 +13,7 @@ from labcrane import open_recording
 from labcrane.approval.lock import read_lock
 from labcrane.cli.consent import await_consent
 from labcrane.participants.register import read
-from labcrane.session.commands import QueueConsole
+from labcrane.testing import QueueConsole
 
 FETCH = "const done = arguments[0]; fetch('/consent').then(r => r.text()).then(done);"
 

@@ -13,7 +13,7 @@ from selenium import webdriver
 from selenium.webdriver.common.by import By
 
 from labcrane import open_recording
-from labcrane.cli.app import main
+from labcrane.testing import main
 
 STEPS = """\
       - questionnaire: [demographics, subjective_accuracy]

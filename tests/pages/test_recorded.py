@@ -10,8 +10,7 @@ from faults.sessions import unique, wait_for
 from recording.test_outdated import faulty
 
 from labcrane import ProtocolError
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
+from labcrane.testing import discover, load
 from labcrane.web.handle import PageHandle, free_port
 from labcrane.web.server.access import NAMES
 from labcrane.web.service import PageConfig

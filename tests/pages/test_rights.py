@@ -13,7 +13,7 @@ from pages.room import STUDY, Room, a_room
 from programs import ran
 
 from labcrane import open_recording
-from labcrane.session.commands import Order
+from labcrane.testing import Order
 
 RECONNECTS = 60
 

@@ -19,12 +19,11 @@ from rehearsal import loaded
 from labcrane.cli.terminal import KEYS as TERMINAL_KEYS
 from labcrane.core import Event
 from labcrane.core.events import KINDS
-from labcrane.design.plan import plan_session
 from labcrane.participants.enrolment import exclude
-from labcrane.session.commands import Command, Order, SettingChange, read_request
+from labcrane.session.commands import SettingChange, read_request
 from labcrane.session.live_settings import FeedbackSettings
 from labcrane.streams.recorder.candidates import answered
-from labcrane.testing import ch8
+from labcrane.testing import Command, Order, ch8, plan_session
 from labcrane.web import handle
 from labcrane.web.control_room import shown
 from labcrane.web.control_room.bars import groups

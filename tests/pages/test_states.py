@@ -18,7 +18,7 @@ from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.by import By
 
 from labcrane.core import Event
-from labcrane.session.commands import Command
+from labcrane.testing import Command
 from labcrane.web.control_room.condition import STATES
 from labcrane.web.handle import PageHandle, free_port
 from labcrane.web.service import PageConfig

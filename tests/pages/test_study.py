@@ -20,13 +20,10 @@ from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.by import By
 
 from labcrane import ProtocolError, RecordingError
-from labcrane.cli.app import main
 from labcrane.participants.enrolment import exclude, note
 from labcrane.participants.register import Sitting, changed, read
 from labcrane.participants.session_windows import check_visit
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
-from labcrane.session.commands import Command, Order
+from labcrane.testing import Command, Order, discover, load, main
 from labcrane.web.study.overview import Overview, Reader
 from labcrane.web.study.study_page import page_of, size
 

@@ -23,10 +23,9 @@ from selenium.webdriver.common.keys import Keys
 from simple_crane import FORM
 
 from labcrane import RecordingError, open_recording
-from labcrane.cli.app import main
 from labcrane.core import Event
 from labcrane.machines import link_frames
-from labcrane.registry.registry import discover
+from labcrane.testing import discover, main
 from labcrane.web.control_room.shown import ShownShapes
 from labcrane.web.translations import WORDS
 from labcrane.web.viewer.film import POINTS, STEPS, WINDOW_SAMPLES, Film

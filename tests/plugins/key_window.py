@@ -6,9 +6,8 @@ from pathlib import Path
 
 from labcrane.feedback.config import ComponentConfig, FeedbackConfig
 from labcrane.feedback.presenter import Presenter
-from labcrane.registry.registry import discover
 from labcrane.streams.feedback_log import FeedbackLog
-from labcrane.testing import TARGETS, ch8, make_run, make_target
+from labcrane.testing import TARGETS, ch8, discover, make_run, make_target
 
 name = sys.argv[1]
 run = make_run(ch8(), task=TARGETS)

@@ -11,8 +11,7 @@ import pytest
 from cranes import build, cranes, needs_bullet, standing
 
 from labcrane import Dynamics, PluginError, ProtocolError, Signal
-from labcrane.registry.registry import discover
-from labcrane.testing import RATE_HZ, ch8, make_run
+from labcrane.testing import RATE_HZ, ch8, discover, make_run
 
 
 @cranes

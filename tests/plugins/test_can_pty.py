@@ -14,11 +14,10 @@ from rehearsal import NoLog, ScriptedConsole, loaded
 
 from labcrane import Frame
 from labcrane.core.clock import SystemClock
-from labcrane.design.plan import plan_session
 from labcrane.protocol.rig import Rig
 from labcrane.session import loop
-from labcrane.session.commands import Command, Order
 from labcrane.session.sequencer import Sequencer
+from labcrane.testing import Command, Order, plan_session
 
 pytestmark = needs_bullet
 

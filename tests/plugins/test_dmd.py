@@ -12,7 +12,7 @@ from dmd_machine import LEVELS, record, true_speed
 
 import labcrane_dmd
 from labcrane import ProtocolError, RecordingError
-from labcrane.cli.app import main
+from labcrane.testing import main
 from labcrane_dmd.arm.drive import SegmentDrive
 from labcrane_dmd.fit.fitting import LAGS, curve_at, fit_model, fit_segment
 from labcrane_dmd.fit.recordings import read_recordings

@@ -15,7 +15,7 @@ from labcrane import FloatArray, Frame, InputDevice, Run, Signal, Tick
 from labcrane.core import Phase
 from labcrane.machines import load_machine, reach
 from labcrane.protocol.rig import Rig
-from labcrane.session.commands import Command, Order
+from labcrane.testing import Command, Order
 
 pytestmark = needs_bullet
 

@@ -13,8 +13,8 @@ from scipy.integrate import quad
 
 import labcrane_dmd
 from labcrane import ProtocolError
-from labcrane.cli.app import main
 from labcrane.machines import load_machine
+from labcrane.testing import main
 from labcrane_dmd.fit.recordings import read_recordings
 
 FOLDER = RETRIEVAL / "hydraulic_arm"

@@ -7,8 +7,7 @@ import pytest
 
 from labcrane import Estimate, FloatArray, StreamError
 from labcrane.core import EstimateSettings, SignalChannel, SignalStream
-from labcrane.registry.registry import discover
-from labcrane.testing import EstimateContract, ch8
+from labcrane.testing import EstimateContract, ch8, discover
 from labcrane_estimates.band_power import BandPower
 from labcrane_estimates.heart import Heart
 from labcrane_estimates.pupil import Pupil

@@ -3,8 +3,7 @@
 import pytest
 
 from labcrane.analysis import Exporter
-from labcrane.registry.registry import discover
-from labcrane.testing import ExporterContract, ch8
+from labcrane.testing import ExporterContract, ch8, discover
 
 
 class TestExporters(ExporterContract):

@@ -17,12 +17,10 @@ from rehearsal import NoLog, ScriptedConsole, loaded
 
 from labcrane import FloatArray, InputDevice, Run, Tick
 from labcrane.core.clock import SystemClock
-from labcrane.design.plan import plan_session
 from labcrane.protocol.rig import Rig
 from labcrane.session import loop
-from labcrane.session.commands import Command, Order
 from labcrane.session.sequencer import Sequencer
-from labcrane.testing import InputContract, ch8, make_frame, make_run
+from labcrane.testing import Command, InputContract, Order, ch8, make_frame, make_run, plan_session
 from labcrane_gateway.settings import GatewaySettings
 from labcrane_gateway.station import Station
 

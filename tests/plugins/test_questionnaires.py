@@ -15,8 +15,7 @@ from labcrane.core.items import in_order
 from labcrane.protocol.questions import questions
 from labcrane.replay import replay_session
 from labcrane.session.questionnaire import QuestionnaireForm
-from labcrane.session.session import Visit, run
-from labcrane.testing import QuestionnaireContract
+from labcrane.testing import QuestionnaireContract, Visit, run
 from labcrane.web.form import _label
 from labcrane_questionnaires.demographics import Demographics
 from labcrane_questionnaires.free import Free

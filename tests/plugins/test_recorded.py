@@ -9,8 +9,7 @@ from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
 
 from labcrane import InputDevice, ProtocolError, open_recording
 from labcrane.protocol.rig import Rig
-from labcrane.session.session import Visit, run
-from labcrane.testing import InputContract, ch8
+from labcrane.testing import InputContract, Visit, ch8, run
 from labcrane_operator import labcrane_inputs
 from labcrane_operator.recorded import RecordedSettings
 

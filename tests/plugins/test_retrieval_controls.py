@@ -17,10 +17,8 @@ from ruamel.yaml import YAML
 from virtual_sticks import desk
 
 from labcrane import Tick
-from labcrane.cli.app import main
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import Study
-from labcrane.testing import make_frame
+from labcrane.testing import Study, main, make_frame
 from labcrane_can.avc import encode
 
 RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"

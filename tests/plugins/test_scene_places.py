@@ -7,12 +7,9 @@ import pytest
 from cranes import needs_bullet
 from dmd_arms import with_files
 
-from labcrane.cli.app import main
-from labcrane.design.plan import plan_session
 from labcrane.files.pseudonyms import pseudonyms
 from labcrane.machines import load_scene, place_objects
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
+from labcrane.testing import discover, load, main, plan_session
 
 pytestmark = [pytest.mark.slow, needs_bullet]
 

@@ -10,8 +10,7 @@ from rehearsal import loaded
 
 from labcrane import open_recording
 from labcrane.replay import replay_session
-from labcrane.session.commands import QueueConsole
-from labcrane.session.session import Visit, run
+from labcrane.testing import QueueConsole, Visit, run
 
 pytestmark = needs_bullet
 

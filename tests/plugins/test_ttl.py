@@ -21,10 +21,17 @@ from labcrane import DeviceError, PluginError, ProtocolError, Tick, Trigger
 from labcrane.core import Echo, Event
 from labcrane.core.events import CODES, PULSES
 from labcrane.protocol.questions import questions
-from labcrane.registry.registry import discover
-from labcrane.session.session import Visit, run
 from labcrane.streams.triggers import Triggers
-from labcrane.testing import TriggerContract, ch8, make_frame, make_run, opened
+from labcrane.testing import (
+    TriggerContract,
+    Visit,
+    ch8,
+    discover,
+    make_frame,
+    make_run,
+    opened,
+    run,
+)
 from labcrane_ttl.parallel_port import CLAIM, WRITE, ParallelTrigger
 from labcrane_ttl.serial_port import KEPT, SerialTrigger, as_byte
 from labcrane_ttl.settings import BoxSettings, ParallelSettings, SerialSettings

@@ -15,9 +15,8 @@ from tactor_board import serial_board, udp_board
 from virtual_sticks import desk
 
 from labcrane import DeviceError, Feedback, Frame, Run, Signal, Tick
-from labcrane.cli.app import main
 from labcrane.core import SessionState, Within
-from labcrane.testing import TARGETS, FeedbackContract, ch8, make_run, make_target
+from labcrane.testing import TARGETS, FeedbackContract, ch8, main, make_run, make_target
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sphere.settings import SphereSettings
 from labcrane_vibration import device

@@ -29,9 +29,8 @@ from labcrane.machines import (
     write_placed,
 )
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import Study
 from labcrane.streams.context import situation_after, situation_of
-from labcrane.testing import make_trial
+from labcrane.testing import Study, make_trial
 from labcrane_view.areas import Projection
 from labcrane_view.settings import CameraSettings, ViewSettings
 from labcrane_view.view import View

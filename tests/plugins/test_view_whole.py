@@ -211,7 +211,7 @@ def test_check_warns_of_an_error_that_every_group_is_shown(
 ) -> None:
     from rehearsal import SHORT
 
-    from labcrane.cli.app import main
+    from labcrane.testing import main
 
     path = tmp_path / "study.yaml"
     path.write_text(SHORT + "views: {cab: {use: view, hud: [trial, distance]}}\n", encoding="utf-8")

@@ -13,8 +13,7 @@ from labcrane.core import Verdict
 from labcrane.doctor.screen import examine
 from labcrane.processes import wake_lock as module
 from labcrane.processes.wake_lock import PROGRAMS, WakeLock, wake_lock
-from labcrane.session.commands import Command, Order
-from labcrane.session.session import Visit, run
+from labcrane.testing import Command, Order, Visit, run
 
 GRANTS = '#!/bin/sh\nwhile [ "${1#/}" = "$1" ]; do shift; done\n"$@"\n'
 """Runs the command behind its options, which begins with a slash, as these programs do."""

@@ -10,9 +10,8 @@ from wrong_protocols import PROTOCOLS, SKELETONS, Wrong, faults, lay_out, right,
 
 from labcrane import ProtocolError
 from labcrane.protocol.questions import about, questions
-from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import Registry
 from labcrane.simulation import rehearsal
+from labcrane.testing import Registry, Study, load
 
 STUDIES = (*sorted(path.parent.name for path in PROTOCOLS.glob("*/protocol.yaml")), *SKELETONS)
 

@@ -10,7 +10,7 @@ from simple_crane import CRANE
 from labcrane import ProtocolError
 from labcrane.analysis import find_cohort
 from labcrane.analysis.report.report import write_report
-from labcrane.cli.app import main
+from labcrane.testing import main
 
 STUDY = (
     """\

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from labcrane import ProtocolError
-from labcrane.protocol.study import load
-from labcrane.registry.registry import Registry
+from labcrane.testing import Registry, load
 
 ROOT = Path(__file__).parents[2]
 

@@ -15,16 +15,13 @@ from hypothesis import strategies as st
 from rehearsal import SHORT
 
 from labcrane import ProtocolError
-from labcrane.cli.app import main
-from labcrane.design.plan import plan_session
 from labcrane.files.units import in_unit
 from labcrane.protocol.design import RULES
 from labcrane.protocol.effective import written_quantities
 from labcrane.protocol.questions import about, questions
-from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import discover
 from labcrane.simulation import rehearsal
 from labcrane.simulation.rehearsal import rehearse
+from labcrane.testing import Study, discover, load, main, plan_session
 
 
 def a_study(folder: Path, *changes: tuple[str, str]) -> Study:

@@ -20,8 +20,7 @@ from labcrane.core.references import Mentioned, mentioned
 from labcrane.machines import load_machine
 from labcrane.protocol.protocol import Participants
 from labcrane.protocol.questions import questions
-from labcrane.protocol.study import load
-from labcrane.registry.registry import Registry, discover
+from labcrane.testing import Registry, discover, load
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 

@@ -11,7 +11,7 @@ from labcrane.files.model import SPREAD, _shape, usual
 from labcrane.files.units import unit_of
 from labcrane.protocol.protocol import Protocol
 from labcrane.protocol.questions import PLAUSIBLE
-from labcrane.registry.registry import discover
+from labcrane.testing import discover
 
 OWN_UNIT = "counts in the unit of what the study measures"
 A_NUMBER_OF = "is the number by which something is called"

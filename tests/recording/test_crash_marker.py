@@ -16,7 +16,6 @@ from rehearsal import ScriptedConsole
 from results.recorded import study
 
 from labcrane import RecordingError, open_recording
-from labcrane.cli.app import main
 from labcrane.files.lock import exclusive, held
 from labcrane.launcher.hang_detector import HANG_S, HangDetector
 from labcrane.processes import watch_clock
@@ -29,8 +28,7 @@ from labcrane.recording.crash_marker import (
     read_crash_marker,
     read_number,
 )
-from labcrane.session.commands import Command, Order
-from labcrane.session.session import Visit, run
+from labcrane.testing import Command, Order, Visit, main, run
 
 PLACE = Place("dynamics 'bullet_crane'", "bullet", "step", "bullet_crane.py:12")
 GOOD = json.dumps([asdict(PLACE)]).encode()

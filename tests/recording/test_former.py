@@ -14,8 +14,8 @@ from scipy.io import loadmat
 
 from labcrane import open_recording
 from labcrane.analysis.measures import measure_session
-from labcrane.cli.app import main
 from labcrane.core import file_name_of
+from labcrane.testing import main
 
 FORMER = Path(__file__).parent / "former"
 NAMES = sorted(packed.name.partition(".")[0] for packed in FORMER.glob("*.h5.gz"))

@@ -10,7 +10,7 @@ from docs.page import ROOT
 from labcrane.core.events import CODES, KINDS, OTHER, PULSES
 from labcrane.recording import labelled
 from labcrane.recording.labels import LONGEST, plain
-from labcrane.session.commands import Order
+from labcrane.testing import Order
 
 BLOCK = {"block": 2, "block_name": "learning", "task": "aiming", "practice": False}
 TRIAL = {

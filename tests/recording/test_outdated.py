@@ -12,11 +12,8 @@ from recording.test_before import BEFORE, labcrane_command
 from labcrane import ProtocolError, open_recording
 from labcrane.analysis.movements import machine_of
 from labcrane.machines.library import find_machine
-from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import discover
-from labcrane.session.commands import Command, Order
 from labcrane.session.session import finish, record
-from labcrane.session.visit import Visit
+from labcrane.testing import Command, Order, Study, Visit, discover, load
 
 Dice = random.Random
 

@@ -12,9 +12,7 @@ from rehearsal import SHORT
 
 from labcrane import Cue, PluginError, ProtocolError, open_recording
 from labcrane.approval.decision import Grant, amend, approve, verify
-from labcrane.cli.app import main
-from labcrane.protocol.study import Study, load
-from labcrane.registry.registry import Registry, discover
+from labcrane.testing import Registry, Study, discover, load, main
 
 ARROW = """\
 import os

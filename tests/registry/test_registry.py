@@ -10,7 +10,7 @@ import labcrane
 from labcrane import Cue, Dynamics, PluginError, Task
 from labcrane.registry.commands import plugin_commands
 from labcrane.registry.hookspecs import ROLES
-from labcrane.registry.registry import discover
+from labcrane.testing import discover
 
 ROOT = Path(__file__).parents[2]
 

@@ -8,9 +8,9 @@ import pytest
 from fresh_environment import environment_with, run
 
 from labcrane import open_recording
-from labcrane.cli.app import main
 from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.scaffold import TEMPLATES, kinds
+from labcrane.testing import main
 
 NAMES = {role: "mycounter" if role == "command" else f"my_{role}" for role in kinds()}
 

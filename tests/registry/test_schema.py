@@ -9,11 +9,9 @@ import pytest
 from needs import needs
 from ruamel.yaml import YAML
 
-from labcrane.cli.app import main
 from labcrane.protocol.json_schema import protocol_schema
-from labcrane.protocol.study import load
 from labcrane.registry.hookspecs import ROLES
-from labcrane.registry.registry import discover
+from labcrane.testing import discover, load, main
 
 if TYPE_CHECKING:
     from jsonschema import Draft202012Validator

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from labcrane import Task
-from labcrane.registry.registry import discover
+from labcrane.testing import discover
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
 

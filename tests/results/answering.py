@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from governed import Willing
 
 from labcrane.core import Event
-from labcrane.session.commands import Command, Order
+from labcrane.testing import Command, Order
 
 
 class Answering(Willing):

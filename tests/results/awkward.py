@@ -7,8 +7,7 @@ from governed import GOVERNED, Lab
 
 from labcrane.analysis import find_cohort
 from labcrane.analysis.cohort import Status
-from labcrane.cli.app import main
-from labcrane.session.session import run
+from labcrane.testing import main, run
 from results.answering import Answering
 from results.undrawn import without_figures
 

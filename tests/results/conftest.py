@@ -9,7 +9,7 @@ from labcrane.analysis import find_cohort
 from labcrane.analysis.cohort import Cohort, Status
 from labcrane.participants.folders import Places
 from labcrane.participants.register import Tombstone, changed
-from labcrane.session.commands import Command, Order
+from labcrane.testing import Command, Order
 from results.awkward import Awkward
 from results.recorded import record, study
 

@@ -11,9 +11,7 @@ from rehearsal import ScriptedConsole, a_study
 from labcrane import FloatArray
 from labcrane.core import Event
 from labcrane.core.clock import ManualClock
-from labcrane.design.plan import plan_session
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import Study
 from labcrane.recording import Channel, StreamHeader, XdfWriter
 from labcrane.recording.foreign_streams import companion_headers
 from labcrane.recording.frame_log import FrameLog, columns
@@ -21,12 +19,11 @@ from labcrane.recording.journal import EVENTS, SessionJournal
 from labcrane.recording.participant_file.writer import consolidate
 from labcrane.recording.xdf.reader import read_xdf
 from labcrane.session import loop
-from labcrane.session.commands import Command
 from labcrane.session.metadata import context
 from labcrane.session.postprocess import conclude
 from labcrane.session.sequencer import Sequencer
-from labcrane.session.session import Visit
 from labcrane.session.visit import claim
+from labcrane.testing import Command, Study, Visit, plan_session
 
 STUDY = """\
 labcrane: 1

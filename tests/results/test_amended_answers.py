@@ -11,8 +11,7 @@ from needs import needs
 from scipy.io import loadmat
 
 from labcrane.approval.decision import amend
-from labcrane.cli.app import main
-from labcrane.session.session import run
+from labcrane.testing import main, run
 from results.answering import Answering
 from results.consumers import bids_errors, needs_octave, octave, r
 from results.test_bids import validated

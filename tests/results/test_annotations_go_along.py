@@ -15,8 +15,8 @@ from scipy.io import loadmat
 
 from labcrane import open_recording
 from labcrane.analysis.cohort import Cohort
-from labcrane.cli.app import main
 from labcrane.recording import annotate, withdraw
+from labcrane.testing import main
 from results.undrawn import without_figures
 
 TEXTS = ("looked at the phone", "BAD_movement of the head", "„krumm“, with\na second line")

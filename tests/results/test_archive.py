@@ -18,10 +18,9 @@ from ruamel.yaml import YAML
 from labcrane import ProtocolError, RecordingError, open_recording
 from labcrane.analysis import find_cohort
 from labcrane.analysis.cohort import Cohort
-from labcrane.cli.app import main
 from labcrane.participants import personal_in
 from labcrane.recording import citation
-from labcrane.session.session import Visit, run
+from labcrane.testing import Visit, main, run
 from labcrane_tables.archive import CHECKSUMS, Archive
 from labcrane_tables.settings import ArchiveSettings
 

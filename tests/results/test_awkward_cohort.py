@@ -13,7 +13,7 @@ from scipy.io import loadmat, savemat
 import labcrane
 from labcrane.analysis import measures_of
 from labcrane.approval.codebook import codebook
-from labcrane.cli.app import main
+from labcrane.testing import main
 from results.awkward import ANSWERS, FORMULA, HALF_FINISHED, NULL, Awkward
 from results.consumers import bids_errors, needs_octave, octave, table
 from results.test_bids import validated

@@ -16,8 +16,7 @@ from needs import needs
 from labcrane import ProtocolError
 from labcrane.analysis import find_cohort, measures_of
 from labcrane.analysis.cohort import Cohort
-from labcrane.design.plan import plan_session
-from labcrane.testing import ch8
+from labcrane.testing import ch8, plan_session
 from labcrane_bids.bids import Bids
 from labcrane_bids.files import EntityLabels
 from labcrane_bids.settings import BidsSettings

@@ -8,7 +8,7 @@ import pytest
 from labcrane import ProtocolError, RecordingError
 from labcrane.analysis import find_cohort
 from labcrane.analysis.cohort import Cohort, Status
-from labcrane.cli.app import main
+from labcrane.testing import main
 from results.recorded import STUDY, record, study
 
 
@@ -241,7 +241,7 @@ def test_an_unfinished_pilot_or_simulation_needs_both_of_its_words(
     tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from labcrane.analysis.cohort import kinds_of
-    from labcrane.session.commands import Command, Order
+    from labcrane.testing import Command, Order
 
     stamps = {kind: True}
     record(study(tmp_path), tmp_path / "data", "P001", orders={0: [Command(Order.END)]}, **stamps)

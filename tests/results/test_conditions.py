@@ -15,9 +15,9 @@ from labcrane.analysis.report.answer import _effects
 from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.report.findings import Results, of_scores
 from labcrane.analysis.report.words import STYLES, paragraphs
-from labcrane.cli.app import main
 from labcrane.simulation.power import Claim, read_effect
 from labcrane.simulation.reported import ask, plan_test
+from labcrane.testing import main
 from results import tested
 from results.consumers import needs_emmeans, r, table
 from results.undrawn import without_figures

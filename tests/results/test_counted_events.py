@@ -9,8 +9,7 @@ from needs import needs
 
 from labcrane.analysis import find_cohort, to_mne
 from labcrane.recording import SessionRecord
-from labcrane.session.commands import Command, Order
-from labcrane.testing import ch8
+from labcrane.testing import Command, Order, ch8
 from labcrane_bids.bids import Bids
 from labcrane_bids.settings import BidsSettings
 from results.recorded import record, study

@@ -16,7 +16,7 @@ from labcrane.analysis import find_cohort
 from labcrane.analysis.quality import is_result
 from labcrane.analysis.report.factors import with_factors
 from labcrane.analysis.statistics.anova import Contrast, compare
-from labcrane.cli.app import main
+from labcrane.testing import main
 from results.consumers import needs_emmeans, needs_r, r, table
 
 # Without the compiled kernels, half an hour.

@@ -9,10 +9,8 @@ import pandas as pd
 import pytest
 from rehearsal import loaded
 
-from labcrane.cli.app import main
-from labcrane.design.plan import plan_session
-from labcrane.protocol.study import Study
 from labcrane.simulation.foreseen import foreseen_tests, in_words
+from labcrane.testing import Study, main, plan_session
 from results.consumers import needs_r, r
 from results.undrawn import without_figures
 

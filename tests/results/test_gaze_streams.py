@@ -15,8 +15,8 @@ from labcrane.analysis.gaze import looks
 from labcrane.analysis.gaze_streams import unmeasured, window_stream
 from labcrane.analysis.measures import MeasureSettings, measure_session
 from labcrane.analysis.report.report import write_report
-from labcrane.cli.app import main
 from labcrane.recording import Channel, SessionRecord, Stream, StreamHeader
+from labcrane.testing import main
 from labcrane.web.viewer.glances import Glances
 from results.recorded import STUDY, record, study
 from results.undrawn import without_figures

@@ -11,14 +11,11 @@ from rehearsal import ScriptedConsole, a_study, simulated_file
 from simple_crane import FORM
 
 from labcrane import RecordingError, open_recording
-from labcrane.cli.app import main
 from labcrane.core import SessionState
 from labcrane.feedback.playback import played
 from labcrane.recording.recorded_frames import RecordedFrames
-from labcrane.session.commands import Command, Order
-from labcrane.session.session import run
-from labcrane.session.visit import Visit
 from labcrane.streams.context import situation_after
+from labcrane.testing import Command, Order, Visit, main, run
 
 STUDY = (
     "labcrane: 1\nstudy: {study}\ntitle: Shown\nrate_hz: 60\n"

@@ -27,11 +27,12 @@ from labcrane.core.findings import worst
 from labcrane.launcher.launcher import Outcome
 from labcrane.launcher.pages import left_behind
 from labcrane.recording import SessionRecord
-from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Message, Order
+from labcrane.session.commands import FeedbackLost, FeedbackReady, Message
 from labcrane.session.visit import visit_of
 from labcrane.streams.feedback_log import log_name
 from labcrane.streams.recorder.health import Flow, rate_of
 from labcrane.streams.sync.report.sync_report import SyncReport
+from labcrane.testing import Command, Order
 from labcrane_bids.events import event_description, event_table
 from results.recorded import STUDY, record, study
 from results.synthetic import cohort_of_36

@@ -12,8 +12,7 @@ from needs import needs
 from labcrane import open_recording
 from labcrane.analysis import answers_of, find_cohort, scores_of
 from labcrane.analysis.cohort import Cohort
-from labcrane.cli.app import main
-from labcrane.session.session import run
+from labcrane.testing import main, run
 from results.answering import Answering
 from results.consumers import r
 

@@ -11,11 +11,11 @@ from rehearsal import SHORT, a_study
 import labcrane
 from labcrane import Frame, ProtocolError, RecordingError, open_recording
 from labcrane.analysis.measures import measure_session
-from labcrane.cli.app import main
 from labcrane.recording import Stream
 from labcrane.replay import replay_session
 from labcrane.replay.restore import restored_study
-from labcrane.session.commands import Command, Order, StreamBack, StreamLost
+from labcrane.session.commands import StreamBack, StreamLost
+from labcrane.testing import Command, Order, main
 from results.recorded import STUDY, record, study
 
 ROOT = Path(__file__).parents[2]

@@ -24,7 +24,7 @@ from labcrane.analysis.report.report import write_report
 from labcrane.analysis.report.sample import in_words, sample
 from labcrane.analysis.report.words import STYLES, paragraphs
 from labcrane.analysis.statistics.time_outs import time_outs
-from labcrane.cli.app import main
+from labcrane.testing import main
 from results import tested
 from results.consumers import under
 from results.synthetic import cohort_of_36

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from labcrane.cli.app import main
+from labcrane.testing import main
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 QUICKEST = "whole"

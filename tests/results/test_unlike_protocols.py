@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from labcrane.analysis.report.protocols import in_words, unlike_protocols
-from labcrane.cli.app import main
+from labcrane.testing import main
 from results.undrawn import without_figures
 
 WRITTEN = """\

@@ -7,7 +7,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from labcrane.cli.app import main
+from labcrane.testing import main
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from programs import ran
 from rehearsal import SHORT
 
 from labcrane.analysis import measures
-from labcrane.cli.app import main
+from labcrane.testing import main
 
 PEOPLE = [f"P{number:03}" for number in range(1, 5)]
 PRODUCTS = {

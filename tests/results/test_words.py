@@ -10,8 +10,7 @@ from once import made_once
 from scipy.stats import f_oneway
 
 from labcrane.analysis import find_cohort
-from labcrane.design.plan import plan_session
-from labcrane.protocol.study import Study
+from labcrane.testing import Study, plan_session
 from labcrane_matlab.matlab import Matlab
 from labcrane_matlab.settings import MatlabSettings
 from labcrane_tables.settings import TableSettings

@@ -10,15 +10,12 @@ from simple_crane import CRANE
 
 from labcrane import ProtocolError, open_recording
 from labcrane.approval.codebook import codebook
-from labcrane.cli.app import main
-from labcrane.design.plan import plan_session
 from labcrane.design.tracks import standing
 from labcrane.replay import replay_session
-from labcrane.session.commands import Command, Order
 from labcrane.session.resume import progress, remaining
-from labcrane.session.session import record, run
-from labcrane.session.visit import Visit
+from labcrane.session.session import record
 from labcrane.simulation.simulation import SimulationJob, simulate
+from labcrane.testing import Command, Order, Visit, main, plan_session, run
 
 ADAPTIVE = (
     """\

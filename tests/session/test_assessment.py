@@ -7,7 +7,7 @@ import pytest
 from labcrane.analysis.scoring.indicator import Performance, indicate
 from labcrane.analysis.scoring.settings import COUNTS, IndicatorSettings
 from labcrane.core import Event
-from labcrane.session.commands import Order
+from labcrane.testing import Order
 from labcrane.web.assessment import LIVE, Assessment
 from labcrane.web.server.access import RIGHTS
 from labcrane.web.state import SessionView

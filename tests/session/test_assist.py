@@ -10,22 +10,16 @@ from needs import need
 from rehearsal import Rehearsal, ScriptedConsole, a_study, rehearse
 from simple_crane import CRANE
 
-from labcrane import Controller, ProtocolError, Signal, open_recording
+from labcrane import Controller, FloatArray, ProtocolError, Signal, Trial, open_recording
 from labcrane.analysis.measures import measure_session
 from labcrane.approval.codebook import codebook
-from labcrane.core.records import Phase, PlannedTrial, Trial
-from labcrane.design.plan import plan_session
+from labcrane.core import Phase, PlannedTrial
 from labcrane.protocol.assisted import Assisted
 from labcrane.protocol.protocol import Assist
 from labcrane.protocol.questions import questions
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
-from labcrane.replay.replay import replay_session
-from labcrane.session.session import run
-from labcrane.session.visit import Visit
+from labcrane.replay import replay_session
 from labcrane.simulation.simulation import SimulationJob, simulate
-from labcrane.testing import ch8, make_run
-from labcrane.types import FloatArray
+from labcrane.testing import Visit, ch8, discover, load, make_run, plan_session, run
 from labcrane_bids.events import event_description, event_table
 from labcrane_bids.motion import tracking_systems
 

@@ -15,12 +15,10 @@ from rehearsal import SHORT, DiesError, DiesInTrial, StallingClock, a_study, reh
 from labcrane import Trial, open_recording
 from labcrane.core import PlannedTrial
 from labcrane.design.tracks import LEVEL, PlannedTrack, plan_rounds
-from labcrane.protocol.study import Study
 from labcrane.protocol.tracks import Track, UpDown
 from labcrane.recording import SessionRecord
 from labcrane.replay import replay_session
-from labcrane.session.commands import Command, Order, QueueConsole
-from labcrane.session.session import Visit, run
+from labcrane.testing import Command, Order, QueueConsole, Study, Visit, run
 
 ANGLES = slice(0, 4)
 

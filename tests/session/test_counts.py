@@ -14,13 +14,13 @@ from labcrane.cli.terminal import Terminal
 from labcrane.core import Event, SessionState
 from labcrane.core.records import is_done
 from labcrane.design.counts import TrialCounts, numbers, spans
-from labcrane.design.plan import SessionPlan, plan_session
+from labcrane.design.plan import SessionPlan
 from labcrane.recording.journal_reader import read_journal
-from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.eligibility import EXEMPT
-from labcrane.session.session import outlook, run, still_owed
-from labcrane.session.visit import Visit, check_begun, check_new
+from labcrane.session.session import outlook, still_owed
+from labcrane.session.visit import check_begun, check_new
 from labcrane.streams.context import situation_after
+from labcrane.testing import Command, Order, QueueConsole, Visit, plan_session, run
 from labcrane.web.state import SessionView
 from labcrane.web.viewer.film import Film
 

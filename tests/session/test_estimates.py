@@ -9,21 +9,18 @@ import pytest
 from rehearsal import ScriptedConsole, a_study
 from simple_crane import CRANE
 
-from labcrane import ProtocolError, open_recording
-from labcrane.analysis.cohort import Participant, Status
+from labcrane import FloatArray, ProtocolError, open_recording
+from labcrane.analysis import Participant
+from labcrane.analysis.cohort import Status
 from labcrane.analysis.quality import estimates_quality
 from labcrane.design.plan import plan_session
 from labcrane.protocol import estimated, rig
 from labcrane.protocol.estimated import WORDS, OthersValues, State, WithEstimates
 from labcrane.protocol.questions import questions
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
-from labcrane.replay.replay import replay_session
+from labcrane.replay import replay_session
 from labcrane.session import eligibility
-from labcrane.session.session import run
-from labcrane.session.visit import Visit
 from labcrane.session.yoked import yoked_to
-from labcrane.types import FloatArray
+from labcrane.testing import Visit, discover, load, run
 from labcrane_estimates.settings import BandPowerSettings
 
 SHARE = "{estimate: load.ratio, between: [1, 3], to: [0, 0.8], at_most_per_s: 0.5}"

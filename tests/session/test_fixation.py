@@ -7,8 +7,8 @@ from rehearsal import SHORT, a_study, rehearse
 
 from labcrane import ProtocolError
 from labcrane.core import Event, SessionState
-from labcrane.session.commands import Command, Order
 from labcrane.streams.context import situation_after
+from labcrane.testing import Command, Order
 
 RATE_HZ = 240
 WITH_POINTS = SHORT.replace(

@@ -15,14 +15,10 @@ from labcrane.analysis import find_cohort
 from labcrane.analysis.scoring.operator_tests import OperatorTest, operator_tests
 from labcrane.cli.terminal import event_line
 from labcrane.core import Event, SessionState
-from labcrane.design.plan import plan_session
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 from labcrane.replay import replay_session
-from labcrane.session.commands import Command, Order
 from labcrane.session.resume import progress, remaining
-from labcrane.session.session import Visit, run
 from labcrane.streams.context import situation_after
+from labcrane.testing import Command, Order, Visit, discover, load, plan_session, run
 from labcrane.web.control_room.buttons import buttons
 from labcrane.web.control_room.condition import state_of
 from labcrane.web.state import SessionView

@@ -10,7 +10,8 @@ from rehearsal import ScriptedConsole, a_study
 
 from labcrane import RecordingError
 from labcrane.files.lock import held
-from labcrane.session.session import Visit, record, run, running
+from labcrane.session.session import record, running
+from labcrane.testing import Visit, run
 
 HOLDER = """
 import sys

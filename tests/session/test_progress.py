@@ -9,11 +9,10 @@ import pytest
 from rehearsal import SHORT, DiesError, DiesInTrial, ScriptedConsole, a_study
 
 from labcrane import ProtocolError, open_recording
-from labcrane.design.plan import plan_session
 from labcrane.recording.paths import parts
-from labcrane.session.commands import Command, Order
 from labcrane.session.resume import progress, remaining
-from labcrane.session.session import Visit, finish, record, run
+from labcrane.session.session import finish, record
+from labcrane.testing import Command, Order, Visit, plan_session, run
 
 TWO_BLOCKS = SHORT.replace(
     "- block: {task: aiming, pairs: 1}",

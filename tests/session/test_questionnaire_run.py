@@ -7,11 +7,7 @@ import pytest
 from rehearsal import SHORT, Rehearsal, ScriptedConsole, a_study, rehearse, simulated_file
 
 from labcrane import open_recording
-from labcrane.cli.app import main
-from labcrane.protocol.study import Study
-from labcrane.session.commands import Command, Order
-from labcrane.session.session import run
-from labcrane.session.visit import Visit
+from labcrane.testing import Command, Order, Study, Visit, main, run
 
 HEAD = SHORT.partition("sessions:")[0]
 RATINGS = """\

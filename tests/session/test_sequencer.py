@@ -11,8 +11,8 @@ from labcrane import Frame, InputDevice
 from labcrane.core import Phase
 from labcrane.protocol.protocol import OnFault
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import Study
-from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Order
+from labcrane.session.commands import FeedbackLost, FeedbackReady
+from labcrane.testing import Command, Order, Study
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ import labcrane
 from labcrane import PluginError, ProtocolError, RecordingError
 from labcrane.core import Event
 from labcrane.protocol.rig import Rig
-from labcrane.session.session import Visit, run
+from labcrane.testing import Visit, run
 
 ROOT = Path(__file__).parents[2]
 

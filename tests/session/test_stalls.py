@@ -12,12 +12,10 @@ from rehearsal import DiesError, DiesInTrial, Rehearsal, StallingClock, a_study,
 from labcrane import Frame, open_recording
 from labcrane.core.clock import Clock
 from labcrane.protocol.protocol import OnFault
-from labcrane.protocol.study import Study
 from labcrane.replay import replay_session
 from labcrane.session import session as session_module
-from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.resume import Progress
-from labcrane.session.session import Visit, run
+from labcrane.testing import Command, Order, QueueConsole, Study, Visit, run
 
 LIMIT_S = 0.25
 """The default of ``presented.max_gap_s``."""

@@ -13,23 +13,14 @@ from labcrane import Signal
 from labcrane.analysis.scoring.settings import COUNTS, TIME
 from labcrane.core import Event
 from labcrane.core.clock import ManualClock
-from labcrane.design.plan import plan_session
 from labcrane.protocol.protocol import OnFault
 from labcrane.protocol.steps import Step
-from labcrane.protocol.study import Study
 from labcrane.session import loop
-from labcrane.session.commands import (
-    Command,
-    FeedbackLost,
-    FeedbackReady,
-    Message,
-    Order,
-    StreamBack,
-    StreamLost,
-)
+from labcrane.session.commands import FeedbackLost, FeedbackReady, Message, StreamBack, StreamLost
 from labcrane.session.resume import Ledger
 from labcrane.session.sequencer import Sequencer
 from labcrane.session.standing import ENDED, EXAMINER, STOP, SessionStage, Standing, why_not
+from labcrane.testing import Command, Order, Study, plan_session
 from labcrane.web.control_room.buttons import buttons
 from labcrane.web.control_room.condition import state_of
 from labcrane.web.state import EARLIER_RULE, SessionView

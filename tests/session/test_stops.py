@@ -22,17 +22,16 @@ from hypothesis.stateful import (
 from stoppable import block, idle_rig, stoppable, with_steps
 
 from labcrane import DeviceError, ProtocolError
-from labcrane.design.plan import plan_session
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.steps import Step
-from labcrane.protocol.study import Study
 from labcrane.recording.journal_reader import LoggedEvent, SessionLog, read_journal
 from labcrane.recording.participant_file.session_group import _trial_rows
 from labcrane.recording.paths import parts
 from labcrane.session import session as session_module
-from labcrane.session.commands import Command, LauncherGone, Order
+from labcrane.session.commands import LauncherGone
 from labcrane.session.resume import numbers, progress, remaining
-from labcrane.session.session import Visit, record
+from labcrane.session.session import record
+from labcrane.testing import Command, Order, Study, Visit, plan_session
 
 RESULTS = {"success", "failure", "timeout", "skipped"}
 OPEN = ("ended", "interrupted")

@@ -8,10 +8,8 @@ from needs import needs
 from rehearsal import loaded
 
 import labcrane
-from labcrane.cli.app import main
-from labcrane.design.plan import plan_session
 from labcrane.protocol.questions import questions
-from labcrane.protocol.study import Study
+from labcrane.testing import Study, main, plan_session
 
 FOLDER = Path(__file__).parents[2] / "protocols" / "crane_pilot"
 ITEMS = ("age", "gender", "experience", "handedness")

@@ -8,7 +8,7 @@ import pytest
 
 import labcrane
 from labcrane.analysis import find_cohort, measures_of
-from labcrane.cli.app import main
+from labcrane.testing import main
 
 FOLDER = Path(__file__).parents[2] / "protocols" / "crane_pilot"
 ONE_BY_ONE = '''\

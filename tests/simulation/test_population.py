@@ -11,10 +11,8 @@ from simple_crane import CRANE
 
 from labcrane import ProtocolError
 from labcrane.analysis import answers_of, find_cohort
-from labcrane.cli.app import main
-from labcrane.design.plan import plan_session
-from labcrane.protocol.study import Study
 from labcrane.simulation.population import Lognormal, Population, read_population
+from labcrane.testing import Study, main, plan_session
 
 COUNT = 2000
 CRANE_PILOT = Path(__file__).parents[2] / "protocols" / "crane_pilot"

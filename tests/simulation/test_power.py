@@ -14,10 +14,10 @@ from statsmodels.stats.proportion import proportion_confint
 
 from labcrane import ProtocolError
 from labcrane.analysis.report.figures import power_curve
-from labcrane.cli.app import main
 from labcrane.simulation.power import Claim, Effect, Pool, make_pool, power, read_effect
 from labcrane.simulation.sample_size import paragraph, sample_size
 from labcrane.simulation.share import share_of
+from labcrane.testing import main
 
 SIZES = (8, 16, 32)
 COHORTS = 2000

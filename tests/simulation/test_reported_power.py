@@ -15,7 +15,6 @@ from statsmodels.stats.power import TTestIndPower
 
 from labcrane import ProtocolError
 from labcrane.analysis import find_cohort, measures_of
-from labcrane.cli.app import main
 from labcrane.simulation.power import Claim, read_effect
 from labcrane.simulation.reported import (
     Drawer,
@@ -30,6 +29,7 @@ from labcrane.simulation.simulation import (
     simulate_tables,
     simulate_trials,
 )
+from labcrane.testing import main
 
 COHORTS = 15
 """Where each cohort is compared by itself, so that few will do."""

@@ -17,8 +17,8 @@ from dying_work import die_once
 from simple_crane import CRANE
 
 from labcrane import LabcraneError, ProtocolError, RecordingError, open_recording
-from labcrane.cli.app import main
 from labcrane.simulation.simulation import SimulationJob, simulate, simulate_study
+from labcrane.testing import main
 
 STUDY = (
     """\

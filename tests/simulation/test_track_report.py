@@ -10,8 +10,8 @@ from simple_crane import CRANE
 from labcrane import open_recording
 from labcrane.analysis import find_cohort
 from labcrane.analysis.report.report import write_report
-from labcrane.cli.app import main
 from labcrane.simulation.track_cohort import OPERATORS, STEEPNESS
+from labcrane.testing import main
 
 STUDY = (
     """\

@@ -254,7 +254,7 @@ def test_a_copy_is_made_by_the_command_and_a_taken_name_is_refused(workspace: Wo
 def test_the_options_of_commands_are_those_that_their_help_lists(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    from labcrane.cli.app import main
+    from labcrane.testing import main
 
     found = {each.name: each for each in offered()}
     assert tuple(found) == OFFERED

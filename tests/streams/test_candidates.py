@@ -8,7 +8,7 @@ import pytest
 from faults.sessions import wait_for
 from streams.emulation import Lab
 
-from labcrane.errors import StreamError
+from labcrane import StreamError
 from labcrane.recording.foreign_streams import read_streams
 from labcrane.recording.paths import parts
 from labcrane.streams.recorder.candidates import Candidate, answered, question

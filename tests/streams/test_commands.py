@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from labcrane import open_recording
-from labcrane.cli.app import main
+from labcrane.testing import main
 
 SENDER = Path(__file__).parent / "emulation" / "sender.py"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from streams.synthetic import SourceClock, after_one_another, arrivals, probe, source
 
-from labcrane.errors import RecordingError
+from labcrane import RecordingError
 from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.dejitter import Dejitter
 from labcrane.streams.sync.offset import fit

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from labcrane.clocks.xdf import resync_xdf
-from labcrane.recording.xdf.header import Channel, StreamHeader
-from labcrane.recording.xdf.writer import XdfWriter
+from labcrane.recording import Channel, StreamHeader, XdfWriter
 
 pyxdf = pytest.importorskip("pyxdf")
 

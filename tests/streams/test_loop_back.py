@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from labcrane.core.findings import Verdict
+from labcrane.core import Verdict
 from labcrane.streams.edges import Change
 from labcrane.streams.sync.report.loop_back import judge_loop_back
 

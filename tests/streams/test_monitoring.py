@@ -15,9 +15,9 @@ from labcrane.core import SignalChannel, SignalFault, SignalStream
 from labcrane.monitoring.monitored_stream import MonitoredStream
 from labcrane.monitoring.stream_meter import StreamMeter, StreamReading
 from labcrane.monitoring.watch import StreamView
+from labcrane.recording import Channel, StreamHeader
 from labcrane.recording.foreign_streams import MONITORS, SIGNAL, Note
 from labcrane.recording.participant_file.signal_faults import write_signal_faults
-from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.streams.probes import Probe
 from labcrane.streams.recorder import signal_feed
 from labcrane.streams.recorder.signal_feed import LIVES, SignalFeed, SignalTap

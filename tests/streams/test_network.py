@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from labcrane.errors import StreamError
+from labcrane import StreamError
 from labcrane.streams.network import LOOPBACK, VARIABLE, describe, use_loopback
 
 

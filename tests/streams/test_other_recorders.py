@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from streams.unkind import START, Clock, received, regular
 
-from labcrane.core.findings import Verdict
+from labcrane.core import Verdict
 from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.raw import RawStream
 from labcrane.streams.sync.report.limits import Limits

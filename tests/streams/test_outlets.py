@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labcrane.core.clock import Tick
+from labcrane import Frame, StreamError, Tick
+from labcrane.core import Event
 from labcrane.core.events import CODES, KINDS, OTHER
-from labcrane.core.records import Event, Frame
-from labcrane.errors import StreamError
-from labcrane.machines.library import load_machine
+from labcrane.machines import load_machine
 from labcrane.recording.journal import event_text
 from labcrane.streams.outlets import Outlets, check_clock
 from labcrane.testing import make_frame, make_run

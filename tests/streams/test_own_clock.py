@@ -8,11 +8,10 @@ from needs import needs
 from streams.synthetic import SourceClock, probe
 
 from labcrane.clocks import correct
+from labcrane.recording import Channel, StreamHeader, XdfWriter
 from labcrane.recording.foreign_streams import OWN_CLOCK, both_clocks, read_streams
 from labcrane.recording.participant_file.recorrect import read_stream
 from labcrane.recording.participant_file.stream_group import write_streams
-from labcrane.recording.xdf.header import Channel, StreamHeader
-from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.recorder.companions import RecordedStreamWriter
 from labcrane.streams.recorder.own_clock import read_own_clock
 from labcrane.streams.recorder.recorder import Recorder

@@ -10,13 +10,13 @@ import pytest
 from streams.synthetic import SourceClock, probe, source
 from streams.unkind import Clock, probes, regular
 
-from labcrane.cli.app import main
+from labcrane import RecordingError
 from labcrane.clocks import correct
-from labcrane.errors import RecordingError
 from labcrane.streams.sync.correction import Treatment
 from labcrane.streams.sync.correction import correct as correct_raw
 from labcrane.streams.sync.pool import pooled
 from labcrane.streams.sync.raw import RawStream, unwrapped
+from labcrane.testing import main
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import pytest
 from needs import need
 from streams.emulation import Lab, Skew, build, stop, truth, until
 
-from labcrane.core.findings import Verdict
+from labcrane.core import Verdict
 from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.dejitter import Dejitter
 from labcrane.streams.sync.raw import raw_of

@@ -13,7 +13,7 @@ import pytest
 import pyxdf
 from streams.emulation import HERE, Lab, stop, until, until_ready
 
-from labcrane.errors import StreamError
+from labcrane import StreamError
 from labcrane.recording.foreign_streams import read_streams
 from labcrane.recording.paths import parts
 from labcrane.recording.xdf.reader import read_xdf

@@ -3,7 +3,7 @@
 import pylsl
 import pytest
 
-from labcrane.errors import StreamError
+from labcrane import StreamError
 from labcrane.streams.request import NOBODY, StreamRequest, identity, unstable_id
 
 

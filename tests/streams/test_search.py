@@ -10,7 +10,7 @@ import pylsl
 import pytest
 from faults.sessions import unique, wait_for
 
-from labcrane.errors import StreamError
+from labcrane import StreamError
 from labcrane.streams import NewestSample, newest, numeric_labels
 from labcrane.streams.search import PORTS, equal, find, known_stream
 

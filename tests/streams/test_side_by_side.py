@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 from rehearsal import a_study
 
-from labcrane.core.clock import Tick
-from labcrane.machines.library import load_machine
-from labcrane.session.visit import Visit
-from labcrane.streams.newest import NewestSample
+from labcrane import Tick
+from labcrane.machines import load_machine
+from labcrane.streams import NewestSample
 from labcrane.streams.outlets import STATE, Outlets, source_id
-from labcrane.testing import make_frame, make_run
+from labcrane.testing import Visit, make_frame, make_run
 
 
 def test_streams_of_two_sessions_of_one_name_do_not_mix(tmp_path: Path) -> None:

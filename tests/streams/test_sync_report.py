@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from streams.synthetic import SourceClock, source
 
-from labcrane.core.findings import Verdict
-from labcrane.errors import RecordingError
+from labcrane import RecordingError
+from labcrane.core import Verdict
+from labcrane.recording import Channel, StreamHeader
 from labcrane.recording.foreign_streams import Note, RecordedStream
-from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.quality import Quality
 from labcrane.streams.sync.raw import LOCAL, RawStream

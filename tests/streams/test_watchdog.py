@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.recording import Channel, StreamHeader
 from labcrane.streams.recorder.health import (
     Condition,
     Counter,

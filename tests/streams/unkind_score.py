@@ -7,7 +7,8 @@ from scipy.stats import t as student
 from streams.strangers import ALL
 from streams.unkind import Drawn
 
-from labcrane.core.findings import Verdict, worst
+from labcrane.core import Verdict
+from labcrane.core.findings import worst
 from labcrane.streams.sync.correction import correct
 from labcrane.streams.sync.report.certificate import Fault, faults
 from labcrane.streams.sync.report.limits import Limits

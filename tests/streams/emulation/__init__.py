@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pyxdf
 
+from labcrane.recording import XdfWriter
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
 from labcrane.recording.paths import parts
-from labcrane.recording.xdf.writer import XdfWriter
 
 HERE = Path(__file__).parent
 
