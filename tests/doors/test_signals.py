@@ -3,12 +3,12 @@
 import math
 import random
 import struct
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import can
 import pytest
+from faults.sessions import wait_for
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -74,13 +74,6 @@ def test_whatever_a_frame_holds_the_signals_stay_within_full_flow(
     extended = identifier != 256 if described else True
     commands.take(can.Message(arbitration_id=identifier, is_extended_id=extended, data=data), 0.0)
     assert all(abs(signal) <= 250.0 for signal in commands.signals(0.0)[0])
-
-
-def wait_for(ready, seconds: float = 240.0) -> None:
-    end = time.monotonic() + seconds
-    while not ready():
-        assert time.monotonic() < end
-        time.sleep(0.005)
 
 
 def test_the_thread_that_reads_a_bus_survives_what_is_no_number_and_what_raises(

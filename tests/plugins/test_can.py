@@ -7,6 +7,7 @@ from pathlib import Path
 
 import can
 import pytest
+from faults.sessions import wait_for
 from slcan_adapter import SlcanAdapter
 
 from labcrane import InputDevice, Tick
@@ -120,13 +121,6 @@ def test_malformed_commands_are_refused_and_told_when_the_panel_is_missed(
                 f"because {why}; 1 frame was not for these valves, the last "
                 "extended 0x18F00425"
             )
-
-
-def wait_for(ready, seconds: float = 240.0) -> None:
-    end = time.perf_counter() + seconds
-    while not ready():
-        assert time.perf_counter() < end, "waited in vain"
-        time.sleep(0.005)
 
 
 @pytest.mark.parametrize(

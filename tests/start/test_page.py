@@ -1,11 +1,11 @@
 """The start page in a browser: what is clicked and typed comes to the file, and nothing is lost."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from faults import sessions
+from faults.sessions import wait_for
 from pages.looks import complaints
 from pages.room import a_browser, text
 from selenium import webdriver
@@ -27,10 +27,6 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chro
     with a_browser(tmp_path_factory.mktemp("profile")) as browser:
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", WINDOW)
         yield browser
-
-
-def wait_for(condition: Callable[[], object]) -> None:
-    sessions.wait_for(condition, 30.0)
 
 
 PRESS = """

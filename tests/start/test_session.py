@@ -7,7 +7,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from faults import sessions
+from faults.sessions import wait_for
 from needs import GRAPHICS, need
 from pages.room import text
 from selenium import webdriver
@@ -102,10 +102,6 @@ class Person:
         self.browser.execute_script(ANSWER_ALL)
         time.sleep(0.5)  # each answer comes back from the record first
         self.browser.execute_script(PRESS, "#submit")
-
-
-def wait_for(condition: object) -> None:
-    sessions.wait_for(condition, 120.0)
 
 
 def test_a_session_is_killed_resumed_and_reported_without_a_terminal(
