@@ -1,11 +1,13 @@
 """Even time stamps for sources that sample evenly but stamp unevenly.
 
-Only where that is shown to help, or asked for: what scatters in a stream may be its samples. The
-sample clock is followed by the smoother that follows clocks, as a phase-locked loop would, but from
-both sides.
+Only where that is shown to help, or asked for: what scatters in a stream may be its samples. Where
+it is shown, the sample clock is followed by the smoother that follows clocks, as a phase-locked
+loop would, but from both sides. Where it is asked for, lines are fitted to stretches of two minutes
+that overlap by half and fade into each other.
 """
 
 import itertools
+from collections.abc import Callable
 from enum import StrEnum
 
 import numpy as np
@@ -23,12 +25,16 @@ hold all of it with 99.8 % (Working and Hotelling 1929: the root of twice F with
 
 FEWEST = 50
 MOST_BLOCKS = 100
-SOONEST_S = 30.0
-"""Some sample of so long is hardly delayed."""
+
+STRETCH_S = 120.0
+
+ROUNDING_S = 1e-12
 
 PASSING_S, SOON_S = 5.0, 1.0
 """Delays pass within the first; what has shifted all samples for longer is a gap. Within the second
 some samples of most seconds are hardly delayed."""
+
+Line = Callable[[FloatArray], FloatArray]
 
 
 class Dejitter(StrEnum):
@@ -41,7 +47,7 @@ class Dejitter(StrEnum):
 
 
 def even(times: FloatArray, index: FloatArray, way: Dejitter) -> FloatArray:
-    """Return dejittered times, as was asked for, shape ``(n,)``.
+    """Return dejittered times, shape ``(n,)``.
 
     Parameters
     ----------
@@ -50,19 +56,18 @@ def even(times: FloatArray, index: FloatArray, way: Dejitter) -> FloatArray:
     index
         Which sample each one is, shape ``(n,)``: counts on over samples that are missing.
     way
-        With ``ENVELOPE``, they are the truth plus the least delay.
+        With ``ENVELOPE``, the line lies below all times: at the truth plus the least delay.
     """
+    if way in {Dejitter.NONE, Dejitter.AUTO}:
+        return times
     result = times.copy()
     for start, stop in runs(times, index):
         if stop - start > 2:  # noqa: PLR2004
-            run = times[start:stop], index[start:stop]
-            result[start:stop], _ = follow_sample_clock(*run, soonest=way is Dejitter.ENVELOPE)
+            result[start:stop] = _follow(times[start:stop], index[start:stop], way)
     return result
 
 
-def follow_sample_clock(
-    times: FloatArray, index: FloatArray, *, soonest: bool = False
-) -> tuple[FloatArray, FloatArray]:
+def follow_sample_clock(times: FloatArray, index: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the times of a steady sample clock whose stamps scatter, and their error at 95 %.
 
     Parameters
@@ -71,18 +76,11 @@ def follow_sample_clock(
         In seconds, shape ``(n,)``, of one clock, in the order of ``index``.
     index
         Which sample each one is, shape ``(n,)``.
-    soonest
-        Whether the clock is followed by the soonest samples, and not by the mean of all.
     """
     due = even_line(times, index)
-    late, count = times - due, min(max(len(times) // FEWEST, 3), MOST_BLOCKS)
-    if soonest:
-        count = min(count, max(round(float(np.ptp(times)) / SOONEST_S), 3))
-    blocks = np.array_split(np.arange(len(times)), count)
-    if soonest:
-        blocks = [block[[np.argmin(late[block])]] for block in blocks]
+    blocks = np.array_split(np.arange(len(times)), min(max(len(times) // FEWEST, 3), MOST_BLOCKS))
     middle = np.array([float(due[block].mean()) for block in blocks])
-    rest = np.array([float(late[block].mean()) for block in blocks])
+    rest = np.array([float((times[block] - due[block]).mean()) for block in blocks])
     change = np.abs(np.diff(rest)) / np.sqrt(2.0)
     # Means of late stamps have a long tail, which the median does not see and a mean does.
     scatter = max(1.4826 * float(np.median(change)), float(np.sqrt(np.mean(change**2)))) + 1e-6
@@ -99,9 +97,7 @@ def follow_sample_clock(
 
 def even_line(times: FloatArray, index: FloatArray) -> FloatArray:
     """Return the straight line through times, by least squares, shape ``(n,)``."""
-    away = index - index.mean()
-    slope = float(away @ (times - times.mean())) / float(away @ away)
-    return np.asarray(times.mean() + slope * away)
+    return np.asarray(_least_squares(times, index)(index))
 
 
 def runs(times: FloatArray, index: FloatArray) -> list[tuple[int, int]]:
@@ -140,3 +136,58 @@ def left_open(times: FloatArray, dejittered: FloatArray, way: Dejitter) -> Float
     wide = round(PASSING_S / SOON_S)
     worst = sliding_window_view(np.pad(level, wide, mode="edge"), 2 * wide + 1).max(axis=1)
     return np.repeat(worst, [len(block) for block in blocks])
+
+
+def _follow(times: FloatArray, index: FloatArray, way: Dejitter) -> FloatArray:
+    """Return the times on lines that fade into each other."""
+    fit = _envelope if way is Dejitter.ENVELOPE else _least_squares
+    duration = times[-1] - times[0]
+    if duration < 1.5 * STRETCH_S:
+        return fit(times, index)(index)
+    count = round(duration / (STRETCH_S / 2)) - 1
+    half = (index[-1] - index[0]) / (count + 1)
+    total, result = np.zeros(len(times)), np.zeros(len(times))
+    for k in range(count):
+        centre = index[0] + (k + 1) * half
+        here = slice(*np.searchsorted(index, (centre - half, centre + half)))
+        near = index[here]
+        weight = np.clip(1.0 - np.abs(near - centre) / half, 1e-9, 1.0)
+        if k == 0:
+            weight[near < centre] = 1.0
+        if k == count - 1:
+            weight[near > centre] = 1.0
+            here = slice(here.start, len(times))
+            near = index[here]
+            weight = np.r_[weight, np.ones(len(near) - len(weight))]
+        result[here] += weight * fit(times[here], near)(near)
+        total[here] += weight
+    return result / total
+
+
+def _least_squares(times: FloatArray, index: FloatArray) -> Line:
+    middle, mean = index.mean(), times.mean()
+    away = index - middle
+    slope = float(away @ (times - mean)) / float(away @ away)
+    return lambda at: mean + slope * (at - middle)
+
+
+def _envelope(times: FloatArray, index: FloatArray) -> Line:
+    """Return the highest line below all times: the hull's edge under their middle.
+
+    Moon, Skelly and Towsley 1999, Estimation and removal of clock skew from network delay
+    measurements. Whatever is below a line takes the place of its end on that side.
+    """
+    rough = _least_squares(times, index)
+    late, away = times - rough(index), index - (index[0] + index[-1]) / 2
+    left, right = 0, len(late) - 1
+    while True:
+        slope = (late[right] - late[left]) / (away[right] - away[left])
+        above = late - late[left] - slope * (away - away[left])
+        lowest = int(np.argmin(above))
+        if above[lowest] > -ROUNDING_S:
+            first, level = index[left], late[left]
+            return lambda at: rough(at) + level + slope * (at - first)
+        if away[lowest] < 0.0:
+            left = lowest
+        else:
+            right = lowest
