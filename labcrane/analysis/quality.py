@@ -81,8 +81,7 @@ def estimates_quality(participant: Participant) -> "pd.DataFrame":
     """Return how late the values of estimates were used, one row per session and estimate.
 
     Latency is the time from what a value stands for to the wake-up of the first tick that used it.
-    ``fallback_share`` is the part of the ticks that used the fallback. ``values_of`` is the
-    participant to whom a yoked one was yoked.
+    ``fallback_share`` is the part of the ticks that used the fallback.
     """
     import pandas as pd
 
@@ -106,13 +105,7 @@ def _estimates(session: SessionRecord) -> Iterator[dict[str, Any]]:
             "latency_median_ms": float(middle),
             "latency_p99_ms": float(most),
             "fallback_share": float(1.0 - used.mean()),
-            "values_of": _yoked_to(session, own.removeprefix("estimate.")),
         }
-
-
-def _yoked_to(session: SessionRecord, estimate: str) -> str:
-    context = session.context
-    return str(context["yoked_to"]) if estimate in context.get("yoked", ()) else ""
 
 
 def loop_backs(participant: Participant) -> "pd.DataFrame":

@@ -1,7 +1,6 @@
 """Estimates in whole sessions: their columns, their states, and a share that follows one."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +12,10 @@ from labcrane import FloatArray, ProtocolError, open_recording
 from labcrane.analysis import Participant
 from labcrane.analysis.cohort import Status
 from labcrane.analysis.quality import estimates_quality
-from labcrane.design.plan import plan_session
 from labcrane.protocol import estimated, rig
-from labcrane.protocol.estimated import WORDS, OthersValues, State, WithEstimates
+from labcrane.protocol.estimated import WORDS, State, WithEstimates
 from labcrane.protocol.questions import questions
 from labcrane.replay import replay_session
-from labcrane.session import eligibility
-from labcrane.session.yoked import yoked_to
 from labcrane.testing import Visit, discover, load, run
 from labcrane_estimates.settings import BandPowerSettings
 
@@ -75,7 +71,7 @@ def recorded(folder: Path, written: str) -> Path:
 @pytest.fixture
 def scripted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(estimated, "Received", Scripted)
-    monkeypatch.setattr(rig, "WithEstimates", lambda *of: WithEstimates(*of[:2], "any", *of[3:]))
+    monkeypatch.setattr(rig, "WithEstimates", lambda *given: WithEstimates(*given[:2], "any"))
 
 
 @pytest.mark.parametrize("name", ["adaptive_assist", "adaptive_sphere"])
@@ -194,84 +190,7 @@ def test_a_replay_reads_the_columns_and_gives_the_same_bits(tmp_path: Path, scri
     assert again.difference is not None
 
 
-def test_another_participant_s_values_are_aligned_trial_by_trial_and_end_with_the_record() -> None:
-    due = 500.0 + np.arange(40) / 10  # 4 s; trial 1 begins after 1 s, trial 2 after 2 s
-    rows = np.column_stack([np.arange(40.0), due - 0.2, np.zeros(40)])
-    others = OthersValues(due, {1: 501.0, 2: 502.0}, rows, oldest=0.5)
-
-    def used(now: float) -> list[float]:
-        out = np.array([-1.0, math.nan, State.NO_DATA])
-        others.fill(out, now)
-        return out.tolist()
-
-    assert used(9000.0) == pytest.approx([0, 8999.8, State.OK]), "with the record's beginning"
-    assert used(9000.3) == pytest.approx([3, 9000.1, State.OK])
-    others.begin_trial(1)
-    assert [used(9007.0 + after)[0] for after in (0.0, 0.1, 1.5)] == [10, 11, 25], "beyond its end"
-    others.begin_trial(3)
-    assert used(9009.0)[0] == 30, "the other has no such trial, and the time goes on"
-    others.begin_trial(2)
-    assert [used(9020.0 + after)[0] for after in (0.0, 1.9, 2.4)] == [20, 39, 39]
-    assert used(9022.5)[::2] == [-1.0, State.NO_DATA]
-
-
-@pytest.mark.slow
-def test_a_yoked_session_has_the_other_s_values_tick_by_tick_and_replays_to_the_bit(
-    tmp_path: Path, scripted: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    study = a_study(tmp_path, yoked("[b]", "{a: [], b: []}", SHARE))
-    names = ("P001", "P002", "P003", "P004")
-    first, _, second, third = sorted(names, key=lambda name: plan_session(study, name, 1).group)
-    visits = {
-        name: Visit(study, name, 1, tmp_path / "data", simulated=True, fast=True) for name in names
-    }
-    records = [open_recording(run(visits[first], ScriptedConsole())).session(1)]
-    found = yoked_to(replace(visits[second], fast=False), None)
-    assert found == {"yoked_to": f"{first}-SIMULATED", "yoked": ["load"]}
-    monkeypatch.setattr(eligibility, "yoked_to", lambda *_: found)
-    path = run(visits[second], ScriptedConsole())
-    records.append(open_recording(path).session(1))
-    loops, inputs = ([each.streams[name].data for each in records] for name in ("loop", "input"))
-    used = set()
-    for trial in range(1, 4):
-        one, other = (
-            frames[loop["trial"] == trial][["estimate.load.ratio", "estimate.load.state"]]
-            for frames, loop in zip(inputs, loops, strict=True)
-        )
-        size = min(len(one), len(other))
-        assert size > 100
-        assert np.array_equal(one[:size], other[:size])
-        used |= {*one["estimate.load.ratio"]}
-    assert used == {2.0, 3.0}
-    assert replay_session(path, 1).difference is None
-    (row,) = estimates_quality(Participant("P", path, Status.SIMULATED, "")).to_dict("records")
-    assert row["values_of"] == f"{first}-SIMULATED"
-    with pytest.raises(ProtocolError, match="needs one more complete session of another"):
-        yoked_to(replace(visits[third], fast=False), None)
-
-
-@pytest.mark.slow
-def test_a_study_with_yoked_groups_tells_no_experimenter_the_group(tmp_path: Path) -> None:
-    for name, groups in (("P001", "[b]"), ("P002", "[b]"), ("P001", "[]")):
-        told = ScriptedConsole()
-        study = a_study(tmp_path, yoked(groups, "{a: [], b: []}"))
-        visit = Visit(study, name, 1, tmp_path / f"data{groups}", simulated=True, fast=True)
-        session = open_recording(run(visit, told)).session(1)
-        trials = [event.data for event in told.told if event.name.startswith("trial.")]
-        assert {"group" in each for each in trials} == {groups == "[]"}
-        assert set(session.trials["group"]) <= {"a", "b"}
-        assert set(session.streams["input"].data["estimate.load.ratio"]) == {2.0}, "the fallback"
-
-
-def yoked(groups: str, design: str, share: str = "1") -> str:
-    written = text(share).replace("{ratio: 2}", f"{{ratio: 2}}, yoked: {groups}")
-    return written.replace("sessions:", f"design: {{groups: {design}}}\nsessions:")
-
-
 REFUSED = {
-    "there is no group 'bb'; did you mean 'b'": yoked("[bb]", "{a: [], b: []}"),
-    r"all groups are yoked \(a, b\); one must have its own": yoked("[a, b]", "{a: [], b: []}"),
-    "there is no group 'b'; design has none": yoked("[b]", "{}"),
     r"assist.share.estimate is 'load.ration', .* no such estimate; did you mean 'load.ratio'": text(
         SHARE.replace("ratio", "ration")
     ),
