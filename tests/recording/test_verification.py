@@ -168,6 +168,20 @@ def test_a_text_that_changes_while_a_journal_is_relabelled_is_noticed(
         relabel_journal(folder / f"ses-01_{kind}.xdf", tmp_path / "new.xdf", "P001", "P002")
 
 
+def test_a_stream_whose_serial_number_names_the_participant_is_relabelled(tmp_path: Path) -> None:
+    """As those of estimates, whose serial number is the session's."""
+    serial = "<acquisition><serial_number>a study/P001/ses-01</serial_number></acquisition>"
+    text = StreamHeader("Load", "Estimate", (Channel("ratio", ""),), "double64").xml
+    assert "<desc>" in text
+    header = StreamHeader.from_xml(text.replace("<desc>", f"<desc>{serial}"))
+    with XdfWriter(tmp_path / "old.xdf") as writer:
+        writer.write_sample(writer.add_stream(header), 1.0, np.array([2.0]))
+    relabel_journal(tmp_path / "old.xdf", tmp_path / "new.xdf", "P001", "P002")
+    (stream,) = read_streams([tmp_path / "new.xdf"])[0]
+    assert "a study/P002/ses-01" in str(stream.header.text)
+    assert "P001" not in str(stream.header.text)
+
+
 @pytest.mark.slow
 def test_what_is_as_it_was_is_accepted(folder: Path, tmp_path: Path) -> None:
     path = folder / "P001.h5"

@@ -100,8 +100,9 @@ def _write_stream(writer: XdfWriter, stream: XdfStream, rename: Rename, old: str
 
 
 def _renamed_header(header: StreamHeader, rename: Rename) -> StreamHeader:
-    text = None if header.text is None else rename(header.text)
-    return replace(header, source_id=rename(header.source_id), text=text)
+    if header.text is not None:
+        return StreamHeader.from_xml(rename(header.text))
+    return replace(header, source_id=rename(header.source_id))
 
 
 def _with_record(text: str, old: str) -> str:
