@@ -329,8 +329,11 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
 
 
 def named(place: Place) -> str:
-    """Return a place as a message names it: ``sessions[1].steps[2]``, items from 1."""
+    """Return a place as a message names it: ``sessions[1].steps[2]``, items from 1.
+
+    Pydantic's names for members of a union, ``function-after[_maps(), ByEstimate]``, are left out.
+    """
     text = ""
-    for step in place:
+    for step in (each for each in place if not is_member(each)):
         text += f"[{step + 1}]" if isinstance(step, int) else f".{step}" if text else str(step)
     return text or "the file"

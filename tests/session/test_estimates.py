@@ -196,6 +196,7 @@ REFUSED = {
     ),
     r"feedback.ball.opacity.estimate is 'lod.ratio', .* did you mean 'load.ratio'": text("1")
     + f"feedback: {{ball: {{use: sphere, opacity: {SHARE.replace('load', 'lod')}}}}}\n",
+    r"assist\.share needs 'at_most_per_s'": text(SHARE.replace(", at_most_per_s: 0.5", "")),
     "between has 3 twice": text(SHARE.replace("[1, 3]", "[3, 3]")),
     "less than or equal to 1": text(SHARE.replace("0.8", "1.8")),
     "there is no single stream 'eg' under streams": text().replace("stream: eeg", "stream: eg"),
