@@ -104,9 +104,8 @@ def ticking(random):
         stamps = np.floor(stamps / told + 1e-6) * told
     return replace(
         drawn, raw=replace(drawn.raw, stamps=stamps), grid_s=tick + told, chance=True,
-        perhaps=frozenset(
-            {Fault.COARSE, Fault.FROZEN, Fault.LATE_STAMPS, Fault.SLOW, Fault.NOISY}
-        ),
+        faults=frozenset({Fault.COARSE}),
+        perhaps=frozenset({Fault.FROZEN, Fault.LATE_STAMPS, Fault.SLOW, Fault.NOISY}),
     )  # fmt: skip
 
 

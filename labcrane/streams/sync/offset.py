@@ -7,7 +7,6 @@ import numpy as np
 from labcrane.streams.sync.clock_curve import Smoothed
 from labcrane.streams.sync.raw import OFFSET, REMOTE, RTT
 from labcrane.streams.sync.smoother import smooth
-from labcrane.streams.sync.stamping import units
 from labcrane.types import FloatArray
 
 SURE = 1.96
@@ -21,6 +20,10 @@ ONE_WAY = 0.15
 
 CONGESTED_S = 1e-3
 LONG = 5
+
+COARSE_S = (1.0 / 64.0, 0.01, 1e-3, 1e-4)
+ENOUGH, NEARLY = 8, 1e-3
+"""So many round trips of whole units of a clock, and so nearly whole, do not occur by chance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +58,7 @@ class OffsetCurve:
         )[::2]
         held_up = ONE_WAY * np.interp(times, self.probes[:, REMOTE], around)
         stray = np.interp(times, self.probes[:, REMOTE], self._outside())
-        hidden = self.least_rtt / 2.0 + units.find(self.probes[:, RTT])
+        hidden = self.least_rtt / 2.0 + _own_unit(self.probes[:, RTT])
         return offset, SURE * deviation + hidden + held_up + stray
 
     def _outside(self) -> FloatArray:
@@ -101,6 +104,16 @@ class OffsetCurve:
             if stop - start >= LONG:
                 total += float(self.probes[stop - 1, REMOTE] - self.probes[start, REMOTE])
         return total
+
+
+def _own_unit(trips: FloatArray) -> float:
+    """Return what our own clock counts in, if round trips are few whole units of it; else 0."""
+    for unit in COARSE_S:
+        parts = trips / unit
+        whole = np.round(parts)
+        if len(trips) >= ENOUGH and np.ptp(whole) > 0.0 and (np.abs(parts - whole) < NEARLY).all():
+            return unit
+    return 0.0
 
 
 def fit(probes: FloatArray, usual_slope: float) -> OffsetCurve:

@@ -638,14 +638,19 @@ def _boundaries(found: _Steps) -> int:
 
 
 def coarse_unit(stamps: FloatArray, *, regular: bool) -> float:
-    """Return the unit that stamps are cut to, in seconds; 0 if there is none."""
+    """Return the unit of a coarse clock of which stamps are whole ones apart; 0 if there is none.
+
+    Or the ticks that are expressed in it, if these are longer.
+    """
     unit = units.find(stamps)
-    if not unit or not regular:
-        return unit
+    if not unit:
+        return 0.0
+    if not regular or len(stamps) < 2:  # noqa: PLR2004
+        return units.tick(stamps, unit, 0.0)
     period = _typical(np.sort(stamps), np.arange(float(len(stamps))))
     if abs(unit - period) < RATE_CHANGE * period:  # all steps are of one sample, or of some
         return units.MILLISECOND if units.are_milliseconds(stamps) else 0.0
-    return unit
+    return units.tick(stamps, unit, period)
 
 
 def _slips(found: _Steps, stamps: FloatArray, grid: float) -> int:
