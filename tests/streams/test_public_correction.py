@@ -293,3 +293,18 @@ def test_an_xdf_file_that_is_not_there_is_told(
 ) -> None:
     assert main(["resync", str(tmp_path / "no.xdf")]) == 1
     assert "there is no XDF file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("tick_s", [1 / 30, 1 / 60, 1 / 75, 0.0156001, 0.0100004])
+def test_events_of_a_clock_that_ticks_are_within_what_is_stated(tick_s: float) -> None:
+    """As frames of a screen, or Windows' timer: ticks of no whole number of microseconds."""
+    for seed in range(3):
+        draw = np.random.default_rng([seed, 67])
+        true = np.sort(draw.uniform(1.0, 300.0, 150))
+        ahead = draw.uniform(0.0, 5000.0)
+        stamps = np.floor((true + ahead) / tick_s) * tick_s
+        asked = np.arange(0.5, 302.0, 2.0)
+        offset = -ahead + draw.uniform(-3e-5, 3e-5, len(asked))
+        trips = 2e-4 + draw.exponential(5e-5, len(asked))
+        found = correct(stamps, probes=np.column_stack([asked + ahead, offset, trips]), rate_hz=0.0)
+        assert np.mean(np.abs(found.time - true) <= found.error) >= 0.95
