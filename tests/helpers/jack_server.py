@@ -1,7 +1,9 @@
 """A JACK server without hardware."""
 
+import fcntl
 import os
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +13,11 @@ from needs import REAL_TIME_PRIORITY, need
 
 @contextmanager
 def a_jack_server(folder: Path, *, real_time: bool = False) -> Iterator[tuple[str, Path]]:
-    """Start a JACK server whose blocks are due in time; give its name and its log."""
+    """Start a JACK server whose blocks are due in time; give its name and its log.
+
+    There is one at a time: JACK names a client's socket by the client and the user alone, so that
+    clients of one name break each other's connection, even where their servers differ.
+    """
     need("jackd", "jack_wait", *(["real-time priorities"] if real_time else []))
     name, log = f"labcrane-{os.getpid()}", folder / "jack.log"
     driver = ["-d", "dummy", "-r", "48000", "-p", "1024"]
@@ -20,7 +26,9 @@ def a_jack_server(folder: Path, *, real_time: bool = False) -> Iterator[tuple[st
         if real_time
         else ["--no-realtime"]
     )
-    with log.open("w", encoding="utf-8") as file:
+    lock = Path(tempfile.gettempdir(), "labcrane-jack.lock")
+    with lock.open("w", encoding="utf-8") as only, log.open("w", encoding="utf-8") as file:
+        fcntl.flock(only, fcntl.LOCK_EX)
         server = subprocess.Popen(["jackd", "-n", name, *how, *driver], stdout=file, stderr=file)
         try:
             waiting = ["jack_wait", "-s", name, "-w", "-t", "60"]
