@@ -394,6 +394,50 @@ def test_a_delay_that_fades_or_grows_by_and_by_is_stated(seed: int, way: str) ->
         assert corrected.error.max() < 5e-4
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_a_delay_that_grows_at_first_is_stated_in_all_samples_that_it_reaches(seed: int) -> None:
+    """Half of it was stated: a low level at the first seconds was taken for one that passed."""
+    random = np.random.default_rng([13, seed])
+    rate, seconds = float(random.choice([60.0, 250.0, 500.0])), random.uniform(120.0, 400.0)
+    t = 1.0 + np.arange(int(rate * seconds)) / (rate * (1.0 + random.uniform(-3e-5, 3e-5)))
+    grows = random.uniform(0.004, 0.09) * (1.0 - np.exp(-(t - 1.0) / random.uniform(3.0, 25.0)))
+    scatter = random.choice([0.0, 1e-3]) * random.exponential(1.0, len(t))
+    at = np.maximum.accumulate(t + grows + scatter)
+    clock = some_clock(random)
+    corrected = correct(clock(at), probes=clock.probes(random, t[-1]), rate_hz=rate)
+    # What goes on at a constant rate until the end may be the sampler's own.
+    assert np.mean(np.abs(corrected.time - t) <= corrected.error / 0.9) >= 0.95
+
+
+@pytest.mark.parametrize("way", ["shifts", "grows and fades"])
+@pytest.mark.parametrize("seed", range(12))
+def test_a_step_of_the_clock_hides_no_delay_that_changed(seed: int, way: str) -> None:
+    """Each side of a step was compared with itself alone: 1 ms was stated for 30."""
+    random = np.random.default_rng([14, seed, *way.encode()])
+    rate, seconds = float(random.choice([60.0, 100.0, 250.0, 500.0])), random.uniform(100.0, 250.0)
+    t = 1.0 + np.arange(int(rate * seconds)) / (rate * (1.0 + random.uniform(-3e-5, 3e-5)))
+    by = random.uniform(0.005, 0.09)
+    if way == "shifts":
+        waits = by * ((t > random.uniform(0.15, 0.85) * seconds) ^ bool(random.integers(2)))
+    else:
+        waits = by * np.sin(np.pi * (t - 1.0) / seconds) ** 2
+    scatter = random.choice([0.0, 5e-4]) * random.exponential(1.0, len(t))
+    at = np.maximum.accumulate(t + waits + scatter)
+    clock = some_clock(
+        random,
+        step=random.choice([-1.0, 1.0]) * np.exp(random.uniform(np.log(0.01), np.log(5.0))),
+        step_at=random.uniform(0.2, 0.8) * seconds,
+    )
+    corrected = correct(
+        clock(at),
+        probes=clock.probes(random, t[-1]),
+        arrivals=pulled(random, at + 1e-3) if random.integers(2) else None,
+        counter=np.arange(float(len(t))) if random.integers(2) else None,
+        rate_hz=rate,
+    )
+    assert np.mean(np.abs(corrected.time - t) <= corrected.error) >= 0.95
+
+
 def by_polls(random: np.random.Generator, ready: np.ndarray, rate: float) -> np.ndarray:
     """Return when samples are stamped by a program that polls at an interval of its own."""
     every = random.choice([random.uniform(0.3, 0.95), random.uniform(1.05, 3.0)]) / rate

@@ -25,6 +25,7 @@ import numpy.typing as npt
 
 from labcrane.errors import RecordingError
 from labcrane.streams.sync.dejitter import Dejitter, even, even_line, follow_sample_clock, left_open
+from labcrane.streams.sync.delays import changes
 from labcrane.streams.sync.epochs import epochs
 from labcrane.streams.sync.placement import LATE_S, PULL_S, Placement, moving, place
 from labcrane.streams.sync.quality import (
@@ -298,20 +299,25 @@ def _evened(
     time, way = placed.time.copy(), treatment.way
     terms = {name: term + placed.terms.get(name, 0.0) for name, term in none_of(len(time)).items()}
     declared = treatment.transport_s != 0.0 or treatment.latency_s != 0.0
-    counted = raw.index is not None or not treatment.can_drop_samples
+    counted = raw.index is not None
+    delays = changes(
+        raw.stamps,
+        placed.time,
+        [(segment, sampling) for segment, sampling, _ in sampled],
+        lossless=counted or not treatment.can_drop_samples,
+        counted=counted,
+    )
     for segment, sampling, followed in sampled:
         part = slice(segment.start, segment.stop)
         # Nothing tells cut stamps from rounded ones, and so whether they are half a unit early.
         stamps: FloatArray | float = sampling.grid_s / 2.0 + sampling.kept_s
         losses: FloatArray | float = sampling.unsure_s
-        shifts = sampling.back_s + (sampling.wander_s if counted else 0.0)
+        shifts = sampling.back_s + delays[part]
         if not declared:  # a mean that is known holds for the middle of a chunk
             stamps += sampling.chunk_s
         if not treatment.can_drop_samples:  # nothing else tells uneven samples from late stamps
             stamps += NEARLY_ALL * sampling.uneven_s
             losses += sampling.slip_s
-        if sampling.shifted is not None:
-            shifts += sampling.shifted.open_s(segment.stop - segment.start)
         if way is Dejitter.AUTO and followed is not None and segment.basis is Basis.PROBES:
             time[part], doubt = followed
             stamps += doubt
@@ -320,7 +326,7 @@ def _evened(
             # A mean that is declared is that of the session, and none of a while.
             open_s = sampling.noise_s if sampling.late_stamps else 0.0
             if declared and sampling.received is None:
-                open_s = min(open_s, TWICE * float(np.max(sampling.wander_s)))
+                open_s = min(open_s, TWICE * float(np.max(delays[part])))
             stamps += max(sampling.shift_s, open_s)
         elif way in {Dejitter.LEAST_SQUARES, Dejitter.ENVELOPE}:
             index = sampling.index if raw.index is None else raw.index[part]

@@ -121,9 +121,9 @@ class Sampling:
     chunk_s
         By how much the middle of a chunk may be beside the sample that its stamps rest on, which
         may be the first or the last: the steps within a chunk are shorter than its samples take.
-    wander_s
-        By how much the level of stamps changes beside their count, shape ``(n,)``: the sampler's
-        rate changed by more than a quartz does, or a delay; nothing tells which.
+    unpaused
+        Times without the pauses and shifts that are known, in seconds, shape ``(n,)``; None where
+        they tell nothing of delays.
     back_s
         By how much the clock of an irregular stream without arrivals may have been set back.
     behind
@@ -158,7 +158,7 @@ class Sampling:
     slip_s: float = 0.0
     shift_s: float = 0.0
     chunk_s: float = 0.0
-    wander_s: FloatArray | float = 0.0
+    unpaused: FloatArray | None = None
     behind: int = 0
 
     @property
@@ -177,7 +177,7 @@ class Sampling:
         if (np.diff(stamps) == 0.0).any():
             return replace(self, contradicted="the same for several samples")
         if units.find(stamps):
-            return replace(self, shifted=paused, wander_s=0.0)
+            return replace(self, shifted=paused, unpaused=None)
         if self.computed:
             return replace(self, contradicted="computed within chunks")
         if self.received is not None:
@@ -194,7 +194,7 @@ class Sampling:
             slip_s=0.0,
             shift_s=0.0,
             chunk_s=0.0,
-            wander_s=0.0,
+            unpaused=None,
         )
 
     def judged_by(self, moved: FloatArray, *, late: bool = False) -> "Sampling":
@@ -305,16 +305,13 @@ def examine(
                 shift_s=receipt.open_shift(flowed, index),
                 breaks=found.breaks[: 0 if counter is None else None],
                 chunk_s=found.chunk_s,
-                wander_s=found.moves(stamps, waited.period, index),
+                unpaused=found.unpaused,
             )
     # Where few slip, no count shows where in their units samples were taken.
     shown = grid if slips >= FEW else 0.0
     noise, late, by_grid, uneven = _noise(time, arrival, found, shown, late=late)
     rates = _rates(found)
     steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
-    moves: FloatArray | float = 0.0
-    if probed and not disordered:
-        moves = found.moves(stamps, found.period, found.index)
     unplaced = late and counter is None and (found.clumped or found.missing > 0)
     return Sampling(
         found.period,
@@ -340,7 +337,7 @@ def examine(
         slip_s=found.period if found.slips else 0.0,
         shift_s=receipt.open_shift(found.flowed, found.index) if late else 0.0,
         chunk_s=found.chunk_s,
-        wander_s=moves,
+        unpaused=found.unpaused if probed and not disordered else None,
     )
 
 
@@ -410,12 +407,6 @@ class _Steps:
     shifted: shifts.Shifts
     slips: bool
     chunk_s: float
-
-    def moves(self, stamps: FloatArray, period: float, index: FloatArray) -> FloatArray:
-        """Return how the level of stamps changes on both clocks: one of them may be slewed."""
-        unmoved = self.unpaused - self.time
-        ours, theirs = (wander.find(each + unmoved, index, period) for each in (self.time, stamps))
-        return np.minimum(ours, theirs)
 
 
 def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -> _Steps:

@@ -52,26 +52,50 @@ def find(time: FloatArray, index: FloatArray, period: float) -> FloatArray:
     late = (time - time[0] - due)[: count * size].reshape(count, size)
     level = np.sort(late, axis=1)[:, size // 4 : size - size // 4].mean(axis=1)
     at = due[size // 2 :: size][:count]
-    far = min(max(STRETCH, count // 5), count - 1)
-    level = level - at * _usual((level[far:] - level[:-far]) / (at[far:] - at[:-far]))
+    levels = [level - at * rate for rate in _usual(level, at)]
+    spans, open_s = zip(*(_open(each, at) for each in levels), strict=True)
+    if max(spans) > MOST_S:  # the sampler's rate changed: only what passes is a delay
+        away = np.abs(levels[0] - _lasting(levels[0]))
+        open_s = (np.maximum(away - _by_chance(levels[0]), 0.0),)
+    open_s = sliding_window_view(np.pad(np.max(open_s, axis=0), 1, mode="edge"), 3).max(axis=1)
+    sizes = np.diff(np.r_[np.arange(count) * size, len(time)])
+    return np.repeat(open_s, sizes)
+
+
+def _open(level: FloatArray, at: FloatArray) -> tuple[float, FloatArray]:
+    """Return over how much levels that last range, and how far each is from those."""
     lasting = _lasting(level)
     walked = _walked(at, lasting)
-    if float(np.ptp(lasting - walked)) > MOST_S:
-        walked = lasting
+    chance = _by_chance(level)
     level, lasting = level - walked, lasting - walked
-    by_chance = SURE * 1.4826 * float(np.median(np.abs(level - lasting)))
-    open_s = np.maximum(np.maximum(lasting.max() - level, level - lasting.min()) - by_chance, 0.0)
-    around = sliding_window_view(np.pad(open_s, 1, mode="edge"), 3).max(axis=1)
-    sizes = np.diff(np.r_[np.arange(count) * size, len(time)])
-    return np.repeat(around, sizes)
+    # At the ends nothing shows that a low level passed, and no stamp is before its sample.
+    ends = np.r_[level[[0, -1]], 2.0 * level[[0, -1]] - level[[1, -2]]]
+    lowest = min(float(lasting.min()), float(ends.min()) + chance)
+    away = np.maximum(lasting.max() - level, level - lowest)
+    return float(np.ptp(lasting)), np.maximum(away - chance, 0.0)
 
 
-def _usual(rates: FloatArray) -> float:
-    """Return the middle of those rates that are most alike, and half of all."""
-    rates = np.sort(rates)
+def _usual(level: FloatArray, at: FloatArray) -> tuple[float, float, float]:
+    """Return middle, least and largest of those rates that are most alike, and half of all.
+
+    They differ by more than by chance where delays change all the time.
+    """
+    far = min(max(STRETCH, len(at) // 5), len(at) - 1)
+    rates = np.sort((level[far:] - level[:-far]) / (at[far:] - at[:-far]))
     half = len(rates) // 2
     first = int(np.argmin(rates[half:] - rates[: len(rates) - half]))
-    return float(np.median(rates[first : first + half + 1]))
+    middle = float(np.median(rates[first : first + half + 1]))
+    chance = _by_chance(level - at * middle) / float(at[far] - at[0])
+    return (
+        middle,
+        min(float(rates[first]) + chance, middle),
+        max(float(rates[first + half]) - chance, middle),
+    )
+
+
+def _by_chance(level: FloatArray) -> float:
+    """Return by how much single levels differ by chance from those around them."""
+    return SURE * 1.4826 * float(np.median(np.abs(level - _lasting(level))))
 
 
 def _lasting(level: FloatArray) -> FloatArray:

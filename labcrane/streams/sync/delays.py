@@ -1,0 +1,87 @@
+"""Delays of a regular stream: by how much they may have changed over all clocks of its source.
+
+A step of the source's clock leaves its sampler and its way alone. What changed before it is as open
+behind it, so that both sides are compared.
+"""
+
+import numpy as np
+
+from labcrane.streams.sync.quality import ClockSegment
+from labcrane.streams.sync.sampling import Sampling
+from labcrane.streams.sync.stamping import wander
+from labcrane.streams.sync.stamping.shifts import MOST_S, Shifts
+from labcrane.types import FloatArray
+
+Part = tuple[ClockSegment, Sampling]
+
+
+def changes(
+    stamps: FloatArray, time: FloatArray, parts: list[Part], *, lossless: bool, counted: bool
+) -> FloatArray:
+    """Return by how much each sample's delay may differ from that of any other, shape ``(n,)``.
+
+    Parameters
+    ----------
+    stamps, time
+        On the source's clock, and the same on ours before dejittering, in seconds, shape ``(n,)``.
+    parts
+        The stretches of one clock, in order, and how each was sampled.
+    lossless
+        Whether samples are only missing where that is seen: otherwise a long step is not a delay.
+    counted
+        Whether the source has a counter.
+    """
+    found = np.zeros(len(time))
+    for run in _runs(time, parts, counted=counted):
+        start = run[0][0].start
+        shifts = [(part.start - start, one.shifted) for part, one in run if one.shifted is not None]
+        if shifts:
+            at = np.concatenate([first + one.at for first, one in shifts])
+            by_s = np.concatenate([one.by_s for _, one in shifts])
+            found[start : run[-1][0].stop] += Shifts(at, by_s).open_s(run[-1][0].stop - start)
+        if lossless and run[0][1].unpaused is not None:
+            _add_wander(found, stamps, time, run, counted=counted)
+    return found
+
+
+def _runs(time: FloatArray, parts: list[Part], *, counted: bool) -> list[list[Part]]:
+    """Return the parts by run: one sampler goes on in each of them, without a pause between."""
+    runs: list[list[Part]] = []
+    for after in parts:
+        if runs and _goes_on(time, runs[-1][-1], after, counted=counted):
+            runs[-1].append(after)
+        else:
+            runs.append([after])
+    return runs
+
+
+def _goes_on(time: FloatArray, before: Part, after: Part, *, counted: bool) -> bool:
+    """Return whether a sampler goes on: no pause, nor a restart, is as short as a delay."""
+    (part, one), (following, other) = before, after
+    if part.stop != following.start or (one.unpaused is None) != (other.unpaused is None):
+        return False
+    samples = float(other.index[0] - one.index[-1]) if counted else 1.0
+    step = float(time[following.start] - time[part.stop - 1])
+    return abs(step - samples * other.period) < MOST_S
+
+
+def _add_wander(
+    found: FloatArray, stamps: FloatArray, time: FloatArray, run: list[Part], *, counted: bool
+) -> None:
+    """Add how the level of stamps changes on both clocks: one of them may be slewed."""
+    index, ours, drifted = [], [], []
+    paused, drift, last = 0.0, 0.0, -1.0
+    for part, one in run:
+        here = slice(part.start, part.stop)
+        unpaused = time[here] if one.unpaused is None else one.unpaused
+        ours.append(unpaused - paused)
+        paused += float(time[part.stop - 1] - unpaused[-1])
+        own = stamps[here] - time[here]
+        drifted.append(own - own[0] + drift)
+        drift = float(drifted[-1][-1])
+        index.append(one.index if counted else one.index - one.index[0] + last + 1.0)
+        last = float(index[-1][-1])
+    flow, count = np.concatenate(ours), np.concatenate(index)
+    period = max(run, key=lambda each: each[0].stop - each[0].start)[1].period
+    levels = (wander.find(each, count, period) for each in (flow, flow + np.concatenate(drifted)))
+    found[run[0][0].start : run[-1][0].stop] += np.minimum(*levels)
