@@ -295,12 +295,18 @@ def test_an_xdf_file_that_is_not_there_is_told(
     assert "there is no XDF file" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("tick_s", [1 / 30, 1 / 60, 1 / 75, 0.0156001, 0.0100004])
-def test_events_of_a_clock_that_ticks_are_within_what_is_stated(tick_s: float) -> None:
+@pytest.mark.parametrize(
+    ("tick_s", "count"),
+    [
+        *((tick_s, 150) for tick_s in (1 / 30, 1 / 60, 1 / 75, 0.0156001, 0.0100004)),
+        *((tick_s, n) for tick_s in (1.0, 0.1, 1 / 60, 1 / 64, 1e-2, 1e-3) for n in (3, 7, 19)),
+    ],
+)
+def test_events_of_a_clock_that_ticks_are_within_what_is_stated(tick_s: float, count: int) -> None:
     """As frames of a screen, or Windows' timer: ticks of no whole number of microseconds."""
     for seed in range(3):
         draw = np.random.default_rng([seed, 67])
-        true = np.sort(draw.uniform(1.0, 300.0, 150))
+        true = np.sort(draw.uniform(1.0, 300.0, count))
         ahead = draw.uniform(0.0, 5000.0)
         stamps = np.floor((true + ahead) / tick_s) * tick_s
         asked = np.arange(0.5, 302.0, 2.0)

@@ -356,9 +356,11 @@ def examine_irregular(
     """
     index = np.arange(len(time), dtype=np.float64) if counter is None else counter
     behind = time < np.maximum.accumulate(time) - BEHIND_S
-    grid = coarse_unit(stamps, regular=False) if len(stamps) >= FEW else 0.0
-    parts = np.round(np.diff(stamps) / grid) if grid else np.zeros(0)
-    cut = np.count_nonzero(parts != np.median(parts)) >= SEVERAL if grid else False
+    many, grid = len(stamps) >= FEW, 0.0
+    if len(stamps) >= SEVERAL:
+        grid = coarse_unit(stamps, regular=False) if many else units.usual(stamps)
+    parts = np.round(np.diff(stamps) / grid) if grid else np.zeros(1)
+    cut = np.count_nonzero(parts != np.median(parts)) >= (SEVERAL if many else 1)
     stalls, longest = _stalls(time, arrival, alone=False)
     back = 0.0 if arrival is not None else _set_back(time)
     return Sampling(

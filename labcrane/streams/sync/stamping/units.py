@@ -9,7 +9,9 @@ import numpy as np
 from labcrane.types import FloatArray
 
 MILLISECOND = 1e-3
-DECIMAL_S = (1.0, 0.1)
+USUAL_S = (1.0, 0.1, 1.0 / 60.0, 1.0 / 64.0, 0.01, MILLISECOND)
+"""What programs, screens, Windows and Linux count time in: few stamps show it."""
+
 LEAST_S, MOST_S = 5e-5, 0.04
 """Finer units are reported unchanged; no timer ticks in coarser ones."""
 
@@ -36,15 +38,24 @@ def find(stamps: FloatArray) -> float:
     A program may have added a constant to what its clock read.
     """
     blur = 4.0 * float(np.spacing(np.abs(stamps).max(initial=1.0)))
-    for unit in DECIMAL_S:
-        if blur < 0.1 * unit and _rest((stamps - stamps[0]) / unit).max() < WHOLE + blur / unit:
-            return unit
+    unit = usual(stamps)
+    if unit > MOST_S:
+        return unit
     for told in (blur, max(blur, TOLD_S)):
         unit = _common(_steps(stamps, told), 2.0 * told)
         if unit >= LEAST_S:
             unit = _refined(stamps, unit, WHOLE + 2.0 * told / unit)
             if LEAST_S <= unit <= MOST_S:
                 return unit
+    return 0.0
+
+
+def usual(stamps: FloatArray) -> float:
+    """Return the usual unit, as :func:`find` does of others; 0 if there is none."""
+    blur = 4.0 * float(np.spacing(np.abs(stamps).max(initial=1.0)))
+    for unit in USUAL_S:
+        if blur < 0.1 * unit and _rest((stamps - stamps[0]) / unit).max() < WHOLE + blur / unit:
+            return unit
     return 0.0
 
 
