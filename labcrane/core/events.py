@@ -224,6 +224,8 @@ _ROWS = (
        _CONTROL, "consent was given", "answers"),
     _E("plugin.slow", None, "a component took too long",
        _CONTROL, "slow call: {why}", "faults", "warn"),
+    _E("estimate.failed", None, "the process of an estimate has failed",
+       _CONTROL, "estimate {estimate}: {why}", "faults", "warn"),
     _E("estimate.lost", None, "an estimate has no value and falls back",
        _CONTROL, "estimate {estimate}: {why}; its fallback is used", "faults", "warn"),
     _E("estimate.back", None, "an estimate has values again",

@@ -7,6 +7,7 @@ from labcrane.core.by_estimate import OF_ESTIMATE
 from labcrane.processes.handle import Patience
 from labcrane.processes.restarted import RestartedProcess
 from labcrane.recording.own_streams import ESTIMATED
+from labcrane.session.commands import EstimateFailed
 from labcrane.session.part import PartConfig
 from labcrane.session.visit import Visit
 from labcrane.streams.outlets import source_id
@@ -42,8 +43,14 @@ class EstimateProcesses:
         """The descriptions of the streams of values."""
         return tuple(handle.sends for handle in self._handles if handle.sends)
 
-    def watch(self, streams: Sequence[Mapping[str, Any]], say: Callable[[str], None]) -> None:
-        """Start those again that have failed, and tell all which streams the recorder has."""
+    def watch(
+        self, streams: Sequence[Mapping[str, Any]], say: Callable[[str], None]
+    ) -> list[EstimateFailed]:
+        """Start those again that have failed, and tell all which streams the recorder has.
+
+        Returns what the session is to record: why they have failed.
+        """
+        failed = []
         taken = {
             each["label"]: {key: each[own] for key, own in PROPERTIES.items()}
             for each in streams
@@ -52,7 +59,9 @@ class EstimateProcesses:
         for handle in self._handles:
             for news in handle.watch():
                 say(f"{handle.name}: {news}")
+                failed.append(EstimateFailed(handle.estimate, news))
             handle.follow(taken)
+        return failed
 
     def stop(self) -> None:
         """Stop all processes."""
@@ -74,7 +83,7 @@ class _Handle(RestartedProcess):
     """The process of one estimate, and the stream that it receives."""
 
     def __init__(self, config: PartConfig, stream: str) -> None:
-        self._stream = stream
+        self._stream, self.estimate = stream, config.name
         self._told: Mapping[str, str] | None = None
         patience = Patience(START_S, SILENT_S, STOP_S)
         super().__init__(MODULE, f"estimate {config.name}", patience, config, LONGEST_PAUSE_S)

@@ -300,7 +300,8 @@ class Launcher:
             self._recordings.watch(self._say)
             self._recorder.offer(self._recordings.sends)
         if self._estimates is not None and self._recorder and self._visit.study.estimates:
-            self._estimates.watch(self._recorder.status.get("streams", ()), self._say)
+            streams = self._recorder.status.get("streams", ())
+            self._kept += self._estimates.watch(streams, self._say)
             self._recorder.offer(self._estimates.sends)
 
     def _offer_estimates(self, send: Callable[[Sent], None]) -> None:

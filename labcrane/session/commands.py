@@ -264,6 +264,15 @@ class FeedbackReady:
 
 
 @dataclass(frozen=True, slots=True)
+class EstimateFailed:
+    """The process of an estimate has failed: ``why``, and what is done about it."""
+
+    what: str
+    why: str
+    kind: Literal["estimate failed"] = "estimate failed"
+
+
+@dataclass(frozen=True, slots=True)
 class LauncherGone:
     """The launcher has died: the session could no longer be stopped, so it ends."""
 
@@ -277,6 +286,7 @@ ProcessReport = (
     | SignalReport
     | FeedbackLost
     | FeedbackReady
+    | EstimateFailed
     | LauncherGone
 )
 """What becomes of the other processes of a run: said by the launcher, not by people."""

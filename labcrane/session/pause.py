@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable
 from labcrane.core.records import Value
 from labcrane.protocol.protocol import OnFault
 from labcrane.session.commands import (
+    EstimateFailed,
     FeedbackLost,
     FeedbackReady,
     LauncherGone,
@@ -109,6 +110,8 @@ class Suspenders:
                 self.release(f"feedback {what}")
             case FeedbackLost():
                 self._feedback_lost(report)
+            case EstimateFailed(what, why):
+                self._note("estimate.failed", {"estimate": what, "why": why})
             case LauncherGone():
                 self._note("launcher.gone", {})
                 self.ending.append("labcrane run was closed or killed")

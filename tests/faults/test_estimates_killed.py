@@ -1,5 +1,6 @@
 """A session with an estimate of a stream of another clock, which is killed, stopped and resumed."""
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -24,6 +25,7 @@ streams:
   eeg: {name: DEVICE}
 estimates:
   truth: {use: truth, stream: eeg, fallback: {sampled: -1}}
+  broken: {use: broken, stream: eeg, fallback: {sampled: -1}}
 tasks:
   aiming: {use: aiming, distances: [1], movements: 4, limit_s: 8}
 sessions:
@@ -57,9 +59,14 @@ class Truth(Estimate):
         return Estimated(float(times[-1]), float(times[0]), (float(samples[-1, 0]),))
 
 
+class Broken(Truth):
+    def update(self, times, samples):
+        raise RuntimeError("no electrode is on")
+
+
 @hookimpl
 def labcrane_estimates():
-    return [offer("truth", TruthSettings, Truth)]
+    return [offer("truth", TruthSettings, Truth), offer("broken", TruthSettings, Broken)]
 '''
 
 
@@ -98,7 +105,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[object]:
 def used(session) -> pd.DataFrame:
     """Return the ticks in which the estimate had a value."""
     frames = session.streams["input"].data
-    own = frames.filter(regex=r"^estimate\.").rename(columns=lambda c: c.rpartition(".")[2])
+    own = frames.filter(regex=r"^estimate\.truth\.").rename(columns=lambda c: c.rpartition(".")[2])
     own["due"] = session.streams["loop"].data["due"].to_numpy()
     return own[own["state"] == 0.0]
 
@@ -118,10 +125,22 @@ def test_each_tick_without_a_value_has_the_fallback_and_each_change_is_an_event(
     frames = session.streams["input"].data
     state = frames["estimate.truth.state"].to_numpy()
     assert set(frames["estimate.truth.sampled"][state != 0.0]) == {-1.0}
-    told = session.events[session.events["name"].str.startswith("estimate.")]
+    told = session.events[session.events["name"].isin(["estimate.lost", "estimate.back"])]
+    told = told[[data["estimate"] == "truth" for data in told["data"]]]
     assert told["name"].iloc[-1] == "estimate.lost", "the amplifier was switched off"
     assert told["data"].iloc[-1]["state"] == "no_data"
     assert state[-1] == 2.0
+
+
+@pytest.mark.slow
+def test_the_record_says_why_the_process_of_an_estimate_failed_and_in_which_line(session) -> None:
+    failed = session.events[session.events["name"] == "estimate.failed"]
+    why = re.compile(
+        r"failed: RuntimeError: no electrode is on \(.*/truth\.py:\d+\); it is started again"
+    )
+    assert len(failed) >= 2, "and again after a restart"
+    assert all(data["estimate"] == "broken" for data in failed["data"])
+    assert any(why.fullmatch(data["why"]) for data in failed["data"])
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from labcrane.launcher import session_handle
 from labcrane.launcher.session_handle import MOST_WAITING, SessionHandle
 from labcrane.session.commands import (
     MOST_BYTES,
+    EstimateFailed,
     FeedbackLost,
     FeedbackReady,
     LauncherGone,
@@ -38,6 +39,7 @@ MESSAGES = st.one_of(
     st.builds(StreamConfirmed, WORDS, WORDS, WORDS),
     st.builds(FeedbackLost, WORDS, WORDS, st.booleans(), st.integers(0, 9), st.integers(0, 9)),
     st.builds(FeedbackReady, WORDS, WORDS),
+    st.builds(EstimateFailed, WORDS, WORDS),
     st.just(LauncherGone()),
     st.builds(StreamOffered, WORDS),
 )

@@ -144,6 +144,11 @@ def test_a_stream_without_samples_is_named_and_breaks_nothing(required, verdict)
     report = judge_stream(empty, resync(empty).quality, Limits(), required=required)
     assert report.verdict is verdict
     assert "no sample came" in report.findings[0].text
+    assert "TCP" in report.findings[0].advice
+    own = replace(empty, header=replace(empty.header, name="labcrane.estimate.load"))
+    (finding,) = judge_stream(own, resync(own).quality, Limits(), required=required).findings
+    assert "estimate.failed" in finding.advice
+    assert "TCP" not in finding.advice
 
 
 def test_restarts_and_warnings_of_the_recorder_are_told():

@@ -15,7 +15,7 @@ from labcrane.recording.foreign_streams import (
     UNSTAMPED,
     RecordedStream,
 )
-from labcrane.recording.own_streams import stated_terms
+from labcrane.recording.own_streams import ESTIMATED, stated_terms
 from labcrane.recording.pictures import CAPTURED
 from labcrane.streams.probes import FASTER
 from labcrane.streams.sync.quality import Quality
@@ -77,7 +77,7 @@ def judge_stream(
     captured = header.name.startswith(CAPTURED)
     own = captured or bool(stated_terms(header.name))
     if samples == 0:
-        findings = [_empty(required=required)]
+        findings = [_empty(header.name, required=required)]
     elif captured:
         findings = _captured(quality, samples, limits, required=required)
     elif own:  # whether there are values is in every tick
@@ -182,12 +182,11 @@ def _missing(recorded: RecordedStream) -> int:
     return sum(int(gap["missing"]) for gap in gaps)
 
 
-def _empty(*, required: bool) -> Finding:
-    return Finding(
-        Verdict.FAIL if required else Verdict.WARN,
-        "no sample came",
-        "start the acquisition in its program first; check that TCP passes the firewall",
-    )
+def _empty(name: str, *, required: bool) -> Finding:
+    advice = "start the acquisition in its program first; check that TCP passes the firewall"
+    if name.startswith(ESTIMATED):
+        advice = "read why in the events estimate.failed; try its plugin with labcrane.testing"
+    return Finding(Verdict.FAIL if required else Verdict.WARN, "no sample came", advice)
 
 
 def _flow(nominal: float, samples: int, quality: Quality, limits: Limits) -> _Judged:
