@@ -21,6 +21,7 @@ def methods(lock: Lock) -> str:
         f"The simulation ran at {_number(protocol.get('rate_hz', 240))} Hz, and every tick was "
         "recorded",
         *_parts(protocol, lock.content.get("settings", {})),
+        *_stop_rules(protocol),
         *_primary(protocol),
         *_design(protocol),
         *_sessions(protocol),
@@ -105,6 +106,20 @@ def _parts(protocol: Mapping[str, Any], settings: Mapping[str, Any]) -> list[str
             if kind != "feedback" and others:
                 said[-1] += f"; by default: {_listed(others, units)}"
     return said
+
+
+def _stop_rules(protocol: Mapping[str, Any]) -> list[str]:
+    said = []
+    for rule in protocol.get("stop_rules", []):
+        what = f"the mean of the estimate {rule.get('estimate')} over a trial"
+        if "questionnaire" in rule:
+            what = f"the {_value(rule['score'])} of the questionnaire "
+            what += _value(rule["questionnaire"])
+        limit = _listed({key: rule[key] for key in ("above", "below") if key in rule})
+        said.append(f"{what} was {limit}")
+    return [f"The session paused for a decision of the experimenter when {' or '.join(said)}"] * (
+        bool(said)
+    )
 
 
 def _primary(protocol: Mapping[str, Any]) -> list[str]:

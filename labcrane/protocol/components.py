@@ -144,7 +144,8 @@ class ComponentResolver:
                 for index, name in enumerate(step.block.ask if step.block else ()):
                     yield (*place, kind, "ask", index), name
         for number, rule in enumerate(protocol.stop_rules):
-            yield ("stop_rules", number, "questionnaire"), rule.questionnaire
+            if rule.questionnaire is not None:
+                yield ("stop_rules", number, "questionnaire"), rule.questionnaire
 
     def _choice(
         self, role: type[RoleT], use: Use, place: Place, named: Place

@@ -229,7 +229,8 @@ class Protocol(Section):
     """How the performance indicator is computed."""
 
     stop_rules: tuple[StopRule, ...] = ()
-    """Scores above which the session pauses and the experimenter decides."""
+    """Limits of scores and estimates beyond which the session pauses and the experimenter
+    decides."""
 
     page: PageSettings = PageSettings()
     """Where the experimenter's and the participant's page are served."""

@@ -495,13 +495,13 @@ class Checker:
     def _check_stop_rules(self, asked: Mapping[str, Questionnaire]) -> None:
         """Note stop rules on scores that a questionnaire does not have."""
         for number, rule in enumerate(self._protocol.stop_rules):
-            questionnaire = asked.get(rule.questionnaire)
+            questionnaire = asked.get(rule.questionnaire or "")
             scores = [score.name for score in questionnaire.scores] if questionnaire else []
             if questionnaire and rule.score not in scores:
                 self._source.problem(
                     ("stop_rules", number, "score"),
                     f"{rule.questionnaire} has no score {rule.score!r}; "
-                    f"{nearest(rule.score, scores, 'it has')}",
+                    f"{nearest(str(rule.score), scores, 'it has')}",
                 )
 
     def _check_feedback(self) -> None:
@@ -612,6 +612,14 @@ def _with_beside(
     }
 
 
+def _sections(protocol: Protocol) -> dict[Place, Settings]:
+    """Return the parts of a protocol that belong to no component, by their place."""
+    sections: dict[Place, Settings] = {("page",): protocol.page}
+    if protocol.assist:
+        sections[(ASSIST,)] = protocol.assist
+    return sections | {("stop_rules", at): rule for at, rule in enumerate(protocol.stop_rules)}
+
+
 def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     """Read and check a protocol.
 
@@ -681,9 +689,7 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
         places: dict[Place, ComponentSpec] = {tuple(p.split(".", 1)): c for p, c in there.items()}
         places |= {("operator",): operator} if operator else {}
         faulty = chooser.but_for_numbers
-        sections: dict[Place, Settings] = {("page",): protocol.page} if protocol else {}
-        if protocol and protocol.assist:
-            sections[(ASSIST,)] = protocol.assist
+        sections = _sections(protocol) if protocol else {}
         parts = Parts(machine[0], places | faulty, tasks, sections, {*faulty})
         references = ReferenceChecker(source, parts)
         references.check()

@@ -16,9 +16,7 @@ from labcrane.participants.personal_data import personal
 from labcrane.protocol.study import Study
 from labcrane.recording.participant_file.questionnaires import ANSWER, END, SCORE
 from labcrane.session.commands import AnswerGiven, Submission
-
-Said = tuple[str, dict[str, Value]]
-"""Name and data of an event that follows."""
+from labcrane.session.stop_rules import Said, after_questionnaire
 
 SIMULATION = "simulation"
 """Who answers for a simulated participant."""
@@ -187,11 +185,6 @@ class QuestionnaireRun:
         What was answered before the session stopped.
     after
         The trial it follows; None when it is a step of its own.
-
-    Attributes
-    ----------
-    alarming
-        Whether a stop rule was met, known when it has ended.
     """
 
     def __init__(
@@ -207,7 +200,7 @@ class QuestionnaireRun:
         if after is not None:
             about["trial"] = after.number
         self._name = name
-        self._rules = [rule for rule in study.protocol.stop_rules if rule.questionnaire == name]
+        self._rules = study.protocol.stop_rules
         # The first session keeps the draws of recordings in which all sessions had the same ones.
         later = (plan.number,) if plan.number > 1 else ()
         drawn = (after.seed if after else plan.seed, step, name, *(() if after else later))
@@ -215,7 +208,6 @@ class QuestionnaireRun:
         asked = study.questionnaires[name]
         self._form = QuestionnaireForm(name, asked, about, answered, derive("cards", *drawn))
         self._known = study.answers.get(name, {})
-        self.alarming = False
 
     @property
     def over(self) -> bool:
@@ -247,9 +239,4 @@ class QuestionnaireRun:
         """
         if not self.over:
             yield self._form.leave(done=skipped)
-        scores = self._form.scores()
-        for rule in self._rules:
-            if scores[rule.score] > rule.above:  # a score that is NaN stops nobody
-                self.alarming = True
-                about: dict[str, Value] = {"questionnaire": self._name, "score": rule.score}
-                yield "stop_rule.met", {**about, "above": rule.above, "value": scores[rule.score]}
+        yield from after_questionnaire(self._rules, self._name, self._form.scores())

@@ -41,6 +41,7 @@ from labcrane.session.pause import DISK, INPUT, Suspenders
 from labcrane.session.questionnaire import QuestionnaireRun
 from labcrane.session.resume import COMPLETE, INCOMPLETE, Ledger, owed_text, within_limits
 from labcrane.session.standing import EXAMINER, STOP, SessionStage, Standing, why_not
+from labcrane.session.stop_rules import MET, Said, after_trial
 from labcrane.session.trial import TrialRun
 
 Ticks = Generator[None, Frame, None]
@@ -337,6 +338,8 @@ class Sequencer:
         self._know("trial.end", attempt.row)
         if trial.planned.counted:
             self._warm_up.count(block, attempt.phase)
+            if attempt.phase not in UNDONE:
+                yield from self._stopped(after_trial(self._study.protocol.stop_rules, attempt.row))
         return attempt.phase
 
     def _pose(self) -> tuple[float, ...]:
@@ -363,10 +366,17 @@ class Sequencer:
         while not (questionnaire.over or Order.SKIP in self._wishes or self._held.ending):
             yield
         self._questionnaire = None
-        for said in questionnaire.end(skipped=Order.SKIP in self._wishes):
-            self._say(*said)
+        ended = questionnaire.end(skipped=Order.SKIP in self._wishes)
         self._enter()
-        if self._waits and questionnaire.alarming:
+        yield from self._stopped(ended)
+
+    def _stopped(self, ended: Iterable[Said]) -> Ticks:
+        """Note what is said at an end, and wait where a stop rule is met."""
+        met = False
+        for name, data in ended:
+            self._say(name, data)
+            met |= name == MET
+        if self._waits and met:
             self._held.hold(STOP)
         yield from self._decided()
 

@@ -13,7 +13,8 @@ from labcrane.core.records import Event
 from labcrane.design.plan import SessionPlan
 from labcrane.protocol.study import Study
 from labcrane.session.commands import Command, Order
-from labcrane.session.questionnaire import QuestionnaireForm, Said
+from labcrane.session.questionnaire import QuestionnaireForm
+from labcrane.session.stop_rules import Said
 from labcrane.web.control_room.earlier import Earlier
 from labcrane.web.control_room.shown import ShownShapes
 from labcrane.web.live import Live

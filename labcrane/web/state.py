@@ -9,7 +9,7 @@ from typing import Any
 from labcrane.core.records import Event, Value, is_done
 from labcrane.session.standing import STOP, SessionStage, Standing
 from labcrane.web.assessment import Assessment
-from labcrane.web.control_room.sentences import INSTRUCTIONS, sentence
+from labcrane.web.control_room.sentences import INSTRUCTIONS, met, sentence
 
 KEPT = 500
 """Newest events that a page can show."""
@@ -201,12 +201,8 @@ class SessionView:
                 self.consent = event.data if what == "needed" else {}
             case "pause" if event.data["by"] == STOP:
                 self.alarm = (self.alarm or EARLIER_RULE) if what == "start" else ""
-            case "stop_rule":
-                data = event.data
-                self.alarm = (
-                    f"{data['questionnaire']} {data['score']} is {data['value']}, above "
-                    f"{data['above']}: continue or end the session"
-                )
+            case "stop_rule" if what == "met":
+                self.alarm = f"{met(event.data)}: continue or end the session"
         self._count(event)
         if kind in LOST:
             self._fault(kind, what, event)

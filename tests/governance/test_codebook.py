@@ -132,10 +132,13 @@ def test_the_methods_and_the_codebook_name_each_estimate(tmp_path: Path) -> None
     )
     assisted = "assist: {use: toward_target, share: {estimate: load.ratio, between: [1, 3], "
     assisted += "to: [0, 0.8], at_most_per_s: 0.2}}\n"
-    lab = Lab(tmp_path, GROUPED.replace("tasks:", f"{estimates}{assisted}tasks:"))
+    rule = "stop_rules: [{estimate: load.ratio, above: 2.5}]\n"
+    lab = Lab(tmp_path, GROUPED.replace("tasks:", f"{estimates}{assisted}{rule}tasks:"))
     lock = lab.approve()
     said = methods(lock)
     for words in (
+        "The session paused for a decision of the experimenter when the mean of the estimate "
+        "load.ratio over a trial was above 2.5. ",
         "The estimate load (band power) had these settings: stream eeg; ",
         "; by default: at most age 2 s; band 4 and 8 Hz; per band 8 and 13 Hz; window 2 s. ",
         "with a share that followed the estimate load.ratio (0 at 1, 0.8 at 3, changed by at most "

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rehearsal import ScriptedConsole, a_study
+from rehearsal import ScriptedConsole, a_study, rehearse
 from simple_crane import CRANE
 
 from labcrane import FloatArray, ProtocolError, open_recording
@@ -16,7 +16,7 @@ from labcrane.protocol import estimated, rig
 from labcrane.protocol.estimated import WORDS, State, WithEstimates
 from labcrane.protocol.questions import questions
 from labcrane.replay import replay_session
-from labcrane.testing import Visit, discover, load, run
+from labcrane.testing import Command, Order, Visit, discover, load, run
 from labcrane_estimates.settings import BandPowerSettings
 
 SHARE = "{estimate: load.ratio, between: [1, 3], to: [0, 0.8], at_most_per_s: 0.5}"
@@ -49,11 +49,13 @@ def text(share: str = SHARE) -> str:
 class Scripted:
     """Gives a ratio of 3 and, a second in four, each of the states without a value."""
 
+    STATES = (State.OK, State.LATE, State.OK, State.NOT_A_NUMBER)
+
     def __init__(self, *_: object) -> None:
-        self._states = (State.OK, State.LATE, State.OK, State.NOT_A_NUMBER)
+        pass
 
     def fill(self, out: FloatArray, now: float) -> None:
-        state = self._states[int(now) % len(self._states)]
+        state = self.STATES[int(now) % len(self.STATES)]
         if state is State.OK:
             out[0] = 3.0
         out[-2:] = now - 0.1, state
@@ -190,7 +192,52 @@ def test_a_replay_reads_the_columns_and_gives_the_same_bits(tmp_path: Path, scri
     assert again.difference is not None
 
 
+RULES = "stop_rules: [{estimate: load.ratio, above: 2.5}, {estimate: load.ratio, below: 2}]\n"
+
+
+def test_a_mean_beyond_its_limit_pauses_after_its_trial_until_the_experimenter_decides(
+    tmp_path: Path, scripted: None
+) -> None:
+    starts = {tick: [Command(Order.START)] for tick in range(0, 20_000, 30)}
+    seen = rehearse(a_study(tmp_path, text("0") + RULES), starts, waits=True)
+    counted = [data["trial"] for data in seen.trials()]
+    assert counted
+    for met, trial in zip(seen.events("stop_rule.met"), counted, strict=True):
+        expected = {"estimate": "load.ratio", "trial": trial, "above": 2.5}
+        assert met.data == {**expected, "value": pytest.approx(3.0)}
+    held = [event.data["by"] for event in seen.events("pause.start")]
+    assert held == ["stop rule"] * len(counted)
+    assert seen.names[-1] == "session.end"
+    assert not seen.events("participant.dropout")
+
+
+def test_a_replay_judges_rules_by_the_recorded_values(tmp_path: Path, scripted: None) -> None:
+    path = recorded(tmp_path, text("0") + RULES)
+    events = open_recording(path).session(1).events
+    assert "stop_rule.met" in set(events["name"])
+    assert "pause.start" not in set(events["name"]), "no person can decide in a simulation"
+    assert replay_session(path, 1).difference is None
+
+
+@pytest.mark.parametrize("state", [State.NOT_A_NUMBER, State.NO_DATA])
+def test_without_any_value_a_rule_is_not_met_and_the_record_says_that_it_was_not_judged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scripted: None, state: State
+) -> None:
+    monkeypatch.setattr(Scripted, "STATES", (state,))
+    events = open_recording(recorded(tmp_path, text("0") + RULES)).session(1).events
+    assert "stop_rule.met" not in set(events["name"])
+    unjudged = events.loc[events["name"] == "stop_rule.unjudged", "data"]
+    trials = [data["trial"] for data in events.loc[events["name"] == "trial.end", "data"]]
+    assert set(trials) >= {data["trial"] for data in unjudged}
+    assert len(unjudged) == 2 * len({data["trial"] for data in unjudged}) > 0
+
+
 REFUSED = {
+    r"stop_rules\[1\].estimate is 'load.ration', .* did you mean 'load.ratio'": text("1")
+    + "stop_rules: [{estimate: load.ration, above: 2}]\n",
+    "a questionnaire and its score, or else an estimate": text("1")
+    + "stop_rules: [{estimate: load.ratio, score: total, above: 2}]\n",
+    "write above or below, one of them": text("1") + "stop_rules: [{estimate: load.ratio}]\n",
     r"assist.share.estimate is 'load.ration', .* no such estimate; did you mean 'load.ratio'": text(
         SHARE.replace("ratio", "ration")
     ),

@@ -149,15 +149,19 @@ def _of_what_is_not_asked(study: Study) -> Doubts:
         if name not in asked:
             yield ("questionnaires", name), f"no session asks questionnaire {name!r}"
     for number, rule in enumerate(protocol.stop_rules):
-        if rule.questionnaire not in asked:
+        if rule.questionnaire and rule.questionnaire not in asked:
             yield (
                 ("stop_rules", number, "questionnaire"),
                 f"the rule goes by {rule.questionnaire!r}, which no session asks",
             )
-    scores = [f"{rule.questionnaire}.{rule.score}" for rule in protocol.stop_rules]
+    scores = [
+        (rule.estimate or f"{rule.questionnaire}.{rule.score}", *rule.limit)
+        for rule in protocol.stop_rules
+    ]
     for number, score in enumerate(scores):
         if score in scores[:number]:
-            yield ("stop_rules", number, "score"), f"a second rule goes by {score}"
+            key = "estimate" if protocol.stop_rules[number].estimate else "score"
+            yield ("stop_rules", number, key), f"a second rule goes by {score[0]}"
 
 
 @asks
@@ -200,10 +204,14 @@ def _of_answers(study: Study) -> Doubts:
 @asks
 def _of_stop_rules(study: Study) -> Doubts:
     for number, rule in enumerate(study.protocol.stop_rules):
+        if rule.questionnaire is None:
+            continue
+        ((key, limit),) = rule.limit.items()
         for score in study.questionnaires[rule.questionnaire].scores:
-            if score.name == rule.score and not score.lowest <= rule.above < score.highest:
+            always = rule.met(score.lowest)
+            if score.name == rule.score and always is rule.met(score.highest):
                 yield (
-                    ("stop_rules", number, "above"),
-                    f"{rule.score} is {score.lowest:g} to {score.highest:g}, so that one above "
-                    f"{rule.above:g} is {'always' if rule.above < score.lowest else 'never'} there",
+                    ("stop_rules", number, key),
+                    f"{rule.score} is {score.lowest:g} to {score.highest:g}, so that one {key} "
+                    f"{limit:g} is {'always' if always else 'never'} there",
                 )

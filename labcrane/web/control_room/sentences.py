@@ -46,6 +46,14 @@ def sentence(event: Event, called: Callable[[int], str]) -> Sentence:
     return Sentence(text[:1].upper() + text[1:], found.kind, found.level)
 
 
+def met(data: Mapping[str, Value]) -> str:
+    """Return a stop rule that was met in words: what is beyond which limit."""
+    mean = f"the mean of {data.get('estimate')} over the trial"
+    what = f"{data['questionnaire']} {data['score']}" if "questionnaire" in data else mean
+    limit = " ".join(f"{key} {data[key]}" for key in ("above", "below") if key in data)
+    return f"{what} is {_plain(data.get('value'))}, {limit}"
+
+
 def _sentence(event: Event, called: Callable[[int], str]) -> Sentence:
     data = event.data
     if event.name == "waiting" and data.get("what") == INSTRUCTIONS:
@@ -59,6 +67,8 @@ def _sentence(event: Event, called: Callable[[int], str]) -> Sentence:
             return Sentence(f"{_trial(data, called)} began{again}", "trials")
         case "trial.end":
             return Sentence(f"{_trial(data, called)} ended: {data.get('outcome')}", "trials")
+        case "stop_rule.met":
+            return Sentence(f"stop rule met: {met(data)}", "answers", "bad")
         case "pause.start":
             mine = data.get("by") == EXAMINER
             return Sentence(
