@@ -19,6 +19,8 @@ FEWEST = 3
 class Heart(OnceASecond[HeartSettings]):
     """Gives both of the newest window; NaN where there are too few beats."""
 
+    highest_hz = BAND_HZ[1]
+
     def _values(self) -> tuple[float, float]:
         band = butter(2, BAND_HZ, "bandpass", fs=self._rate_hz, output="sos")
         energy = sosfiltfilt(band, self._window.samples[:, 0]) ** 2

@@ -4,7 +4,7 @@ import math
 from abc import abstractmethod
 from typing import Generic, TypeVar
 
-from labcrane import Estimate, FloatArray
+from labcrane import Estimate, FloatArray, StreamError
 from labcrane.core import Estimated, SignalStream
 from labcrane_estimates.settings import HeartSettings, SkinSettings
 from labcrane_estimates.window import Window
@@ -13,13 +13,26 @@ SettingsT = TypeVar("SettingsT", bound=HeartSettings | SkinSettings)
 
 
 class OnceASecond(Estimate, Generic[SettingsT]):
-    """Gives the values of the newest window, once a second; NaN where samples are missing."""
+    """Gives the values of the newest window, once a second; NaN where samples are missing.
+
+    Attributes
+    ----------
+    highest_hz
+        Up to which frequency the signal is needed.
+    """
+
+    highest_hz: float
 
     def __init__(self, settings: SettingsT) -> None:
         self._settings = settings
 
     def begin(self, stream: SignalStream) -> None:
         self._window = Window(stream, [self._settings.channel], self._settings.window_s)
+        if not stream.rate_hz > 2.0 * self.highest_hz:
+            raise StreamError(
+                f"stream {stream.name!r} has {stream.rate_hz:g} Hz, and its signal is needed up to "
+                f"{self.highest_hz:g} Hz; give a stream of more than {2.0 * self.highest_hz:g} Hz"
+            )
         self._rate_hz = stream.rate_hz
         self._newest: Estimated | None = None
 

@@ -53,8 +53,8 @@ class HeartSettings(EstimateSettings):
     channel: str
     """Label of the channel of the ECG."""
 
-    window_s: PositiveFloat = 30.0
-    """Time from which both are computed, in seconds."""
+    window_s: Annotated[float, Field(ge=5.0)] = 30.0
+    """Time from which both are computed, in seconds; three beats have to be in it."""
 
 
 class SkinSettings(EstimateSettings):
@@ -65,8 +65,8 @@ class SkinSettings(EstimateSettings):
     channel: str
     """Label of the channel of the conductance."""
 
-    window_s: PositiveFloat = 60.0
-    """Time over which responses are counted, in seconds."""
+    window_s: Annotated[float, Field(ge=10.0)] = 60.0
+    """Time over which responses are counted, in seconds; each has to rise and fall in it."""
 
     smallest: PositiveFloat = 0.05
     """Amplitude from which a rise is a response, in the channel's unit: 0.05 uS (Boucsein 2012)."""

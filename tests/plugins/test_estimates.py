@@ -1,9 +1,11 @@
 """The estimates that come with labcrane, against signals whose values are known."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from labcrane import Estimate, FloatArray, StreamError
 from labcrane.core import EstimateSettings, SignalChannel, SignalStream
@@ -156,12 +158,16 @@ def test_the_rate_and_rmssd_are_those_of_the_beats() -> None:
     assert rmssd == pytest.approx(40.0, abs=4.0)  # a sample is 4 ms
 
 
+@pytest.mark.parametrize("drift", [0.1, -0.1])
 @pytest.mark.parametrize("seed", range(20))
-def test_the_rate_of_responses_is_that_of_those_that_are_large_enough(seed: int) -> None:
+def test_the_rate_of_responses_is_that_of_those_that_are_large_enough(
+    seed: int, drift: float
+) -> None:
+    """Also while the level drifts by up to 6 uS in the minute: more than any response falls."""
     draw = np.random.default_rng(seed)
     onsets = 4.0 + np.cumsum(draw.uniform(6.0, 9.0, 6))
     amplitudes = draw.choice([0.01, 0.15, 0.6], 6)
-    samples = eda(onsets, amplitudes, drift=draw.uniform(-0.005, 0.002))
+    samples = eda(onsets, amplitudes, drift=drift * draw.uniform())
     (rate,) = values(Skin(SKIN), EDA, samples)
     assert rate == np.count_nonzero(amplitudes > 0.1)
 
@@ -197,6 +203,25 @@ def test_a_window_begins_anew_where_times_go_back() -> None:
     found = load.update(times[250:510] - 50.0, samples[250:510])
     assert found is not None
     assert 50.0 <= found.first < 51.0
+
+
+@pytest.mark.parametrize(("settings", "slow"), [(SKIN, 2.0), (HEART, 40.0)])
+def test_a_stream_that_is_too_slow_for_its_signal_is_refused_with_the_rate_that_is_needed(
+    settings: EstimateSettings, slow: float
+) -> None:
+    name, at = ("skin", EDA) if settings is SKIN else ("heart", ECG)
+    estimate = built(name, settings)
+    with pytest.raises(StreamError, match=f"give a stream of more than {slow:g} Hz"):
+        estimate.begin(replace(at, rate_hz=slow))
+    fast = replace(at, rate_hz=slow + 1.0)
+    shortest = settings.model_copy(update={"window_s": 10.0 if settings is SKIN else 5.0})
+    assert len(values(built(name, shortest), fast, np.zeros((600, 1)))) == len(settings.values)
+
+
+@pytest.mark.parametrize("settings", [SKIN, HEART])
+def test_a_window_in_which_no_value_can_be_is_refused(settings: EstimateSettings) -> None:
+    with pytest.raises(ValidationError, match="greater than or equal to"):
+        type(settings).model_validate({**settings.model_dump(), "window_s": 4.9})
 
 
 def test_a_channel_that_is_not_there_is_refused_with_those_that_are() -> None:
