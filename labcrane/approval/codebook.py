@@ -74,15 +74,16 @@ def codebook(study: Study) -> list[CodebookColumn]:
         ("task", next(iter(study.tasks.values())), task_source),
     ):
         layout = Layout(table, component.signals)
-        names = zip(layout.columns, layout.units, strict=True)
+        defined = {name: each.definition for each in component.signals for name in each.columns}
         found += [
             CodebookColumn(
                 table,
                 name,
                 unit,
                 next((by for of, by in own.items() if name.startswith(of)), source),
+                defined[name],
             )
-            for name, unit in names
+            for name, unit in zip(layout.columns, layout.units, strict=True)
         ]
     found += [CodebookColumn("events", name, unit, CORE) for name, unit in EVENTS]
     return found + _trials(study)
@@ -103,9 +104,15 @@ def _trials(study: Study) -> list[CodebookColumn]:
         unit = trial_units(study.tasks[task]).get(name, "" if _is_text(values) else "1")
         defined = trial_definitions(study.tasks[task]).get(name, "")
         found[name] = CodebookColumn("trials", name, unit, source, defined)
-    for task, choice in study.task_choices.items():
+    means = {
+        f"{name}_{value}": study.choices[ESTIMATES + name]
+        for name, settings in study.estimates.items()
+        for value in settings.values
+    }
+    for task, its_choice in study.task_choices.items():
         for signal in study.tasks[task].results:
             for name in signal.columns:
+                choice = means.get(name, its_choice)
                 source = f"{choice.plugin}: {choice.name}"
                 found[name] = CodebookColumn("trials", name, signal.unit, source, signal.definition)
     return list(found.values())

@@ -52,8 +52,13 @@ def estimate_signals(name: str, settings: EstimateSettings) -> tuple[Signal, ...
     Its values as they are used, the time they stand for and its state.
     """
     own = OF_ESTIMATE + name
-    values = (Signal(f"{own}.{value}", "") for value in settings.values)
-    return (*values, Signal(f"{own}.time", "s"), Signal(f"{own}.state", "1"))
+    as_used = "value as it is used: the fallback in every state but 0"
+    states = ", ".join(f"{each.value} {each.name.lower().replace('_', ' ')}" for each in State)
+    return (
+        *(Signal(f"{own}.{value}", "", definition=as_used) for value in settings.values),
+        Signal(f"{own}.time", "s", definition="time that the newest value stands for"),
+        Signal(f"{own}.state", "1", definition=f"state of the estimate: {states}"),
+    )
 
 
 class TrialMeans(SecondaryTask):

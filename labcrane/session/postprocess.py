@@ -134,7 +134,7 @@ def _corrected(one: _Read, raw: RawStream, end: float | None, limits: Limits) ->
         treatment = _treatment(one)
         if stated := stated_terms(one.recorded.header.name):
             terms = {term: one.group[f"data/{term}"][:] for term in stated}
-            corrected = as_stated(raw.stamps, terms, end)
+            corrected = as_stated(raw, terms, end)
         else:
             corrected = correct(raw, treatment, end)
     # One stream's clock must not keep a session from its file; nor may what nobody foresaw of it.

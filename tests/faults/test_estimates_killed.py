@@ -141,6 +141,11 @@ def test_the_record_says_why_the_process_of_an_estimate_failed_and_in_which_line
     assert len(failed) >= 2, "and again after a restart"
     assert all(data["estimate"] == "broken" for data in failed["data"])
     assert any(why.fullmatch(data["why"]) for data in failed["data"])
+    restarts = {
+        one["name"].removeprefix("labcrane.estimate."): one["quality"]["restarts"]
+        for one in session.sync_report["streams"]
+    }
+    assert restarts["broken"] > 0
 
 
 @pytest.mark.slow

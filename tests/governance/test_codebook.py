@@ -147,6 +147,10 @@ def test_the_methods_and_the_codebook_name_each_estimate(tmp_path: Path) -> None
         assert words in said
     sources = {row["name"]: row["source"] for row in lock.content["codebook"]}
     assert sources["estimate.load.ratio"] == "estimates: band_power"
+    assert sources["load_ratio"] == "estimates: band_power", "the mean over a trial"
+    defined = {row["name"]: row["definition"] for row in lock.content["codebook"]}
+    assert defined["estimate.load.time"] == "time that the newest value stands for"
+    assert defined["estimate.load.state"].startswith("state of the estimate: 0 ok, 1 warming up, ")
 
 
 TRAINED = GROUPED.replace("design:", "design:\n  primary: [movement_time, absolute_error]").replace(

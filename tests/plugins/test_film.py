@@ -15,6 +15,7 @@ import pytest
 from labcrane import Capture, DeviceError, Offer, Settings
 from labcrane.core import Captured, Finding, Verdict
 from labcrane.streams.sync.correction import as_stated
+from labcrane.streams.sync.raw import RawStream
 from labcrane.testing import CaptureContract, ExaminationContract
 from labcrane_film import labcrane_captures, stamps
 from labcrane_film.film import FilmedSource, examine
@@ -256,9 +257,9 @@ def test_a_frame_without_pictures_is_counted_and_the_next_one_is_recorded(tmp_pa
 
 def test_missing_film_between_two_files_is_a_gap() -> None:
     time = np.r_[np.arange(90), np.arange(310, 400)] / 30.0
-    quality = as_stated(time, {"clock": np.zeros(180)}, 14.0).quality
+    quality = as_stated(RawStream(time), {"clock": np.zeros(180)}, 14.0).quality
     assert (quality.gaps, round(quality.longest_gap_s, 3)) == (1, round(221 / 30, 3))
-    assert as_stated(time[:90], {"clock": np.zeros(90)}, 3.0).quality.gaps == 0
+    assert as_stated(RawStream(time[:90]), {"clock": np.zeros(90)}, 3.0).quality.gaps == 0
 
 
 def with_b_frames(path: Path) -> SourceSettings:

@@ -172,12 +172,13 @@ MISSING_S = 1.0
 """Frames that are further apart, and by more than three usual steps, have a gap between them."""
 
 
-def as_stated(time: FloatArray, terms: Terms, end: float | None) -> Corrected:
+def as_stated(raw: RawStream, terms: Terms, end: float | None) -> Corrected:
     """Return the times of our own processes: on our clock already, with a stated uncertainty.
 
     They are on this computer and convert a device's stamps themselves: neither probes nor arrivals
     tell more. An error is NaN where one of its terms is unknown.
     """
+    time = raw.stamps
     silent = end - float(time[-1]) if end is not None and len(time) else 0.0
     steps = np.diff(time)
     gaps = steps[steps > max(MISSING_S, 3.0 * float(np.median(steps)))] if len(steps) else steps
@@ -185,6 +186,7 @@ def as_stated(time: FloatArray, terms: Terms, end: float | None) -> Corrected:
         silent_s=silent,
         gaps=len(gaps),
         longest_gap_s=float(gaps.max(initial=0.0)),
+        restarts=len(raw.resets),
         **_errors(time, terms, time),
     )
     return Corrected(time, terms, time, quality=quality)
