@@ -1,11 +1,14 @@
-"""Estimates of load: band powers of an EEG, heart beats, skin conductance, pupil size."""
+"""Estimates: of load, from body and pupil, and of what the operator looks at and does."""
 
 from labcrane import Estimate, Offer, hookimpl, offer
 from labcrane_estimates.settings import (
     BandPowerSettings,
+    DrtResponseSettings,
+    GazeRegionSettings,
     HeartSettings,
     PupilSettings,
     SkinSettings,
+    StickActivitySettings,
 )
 
 labcrane_api = 1
@@ -18,4 +21,11 @@ def labcrane_estimates() -> list[Offer[Estimate]]:
         offer("heart", HeartSettings, "labcrane_estimates.heart:Heart"),
         offer("skin", SkinSettings, "labcrane_estimates.skin:Skin"),
         offer("pupil", PupilSettings, "labcrane_estimates.pupil:Pupil"),
+        offer("gaze_region", GazeRegionSettings, "labcrane_estimates.gaze_region:GazeRegion"),
+        offer(
+            "stick_activity",
+            StickActivitySettings,
+            "labcrane_estimates.stick_activity:StickActivity",
+        ),
+        offer("drt_response", DrtResponseSettings, "labcrane_estimates.drt_response:DrtResponse"),
     ]

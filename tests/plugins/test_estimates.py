@@ -11,21 +11,32 @@ from labcrane import Estimate, FloatArray, StreamError
 from labcrane.core import EstimateSettings, SignalChannel, SignalStream
 from labcrane.testing import EstimateContract, ch8, discover
 from labcrane_estimates.band_power import BandPower
+from labcrane_estimates.drt_response import DrtResponse
+from labcrane_estimates.gaze_region import GazeRegion
 from labcrane_estimates.heart import Heart
 from labcrane_estimates.pupil import Pupil
 from labcrane_estimates.settings import (
     BandPowerSettings,
+    DrtResponseSettings,
+    GazeRegionSettings,
     HeartSettings,
     PupilSettings,
     SkinSettings,
+    StickActivitySettings,
 )
 from labcrane_estimates.skin import Skin
+from labcrane_estimates.stick_activity import StickActivity
 
 RATE_HZ = 250.0
 EEG = SignalStream("cap", "EEG", RATE_HZ, (SignalChannel("Fz"), SignalChannel("Pz")))
 ECG = SignalStream("belt", "ECG", RATE_HZ, (SignalChannel("lead"),))
 EDA = SignalStream("hand", "EDA", 50.0, (SignalChannel("palm"),))
 EYE = SignalStream("eye", "Gaze", 60.0, (SignalChannel("pupil"),))
+GAZE = SignalStream("eye", "Gaze", 60.0, (SignalChannel("x"), SignalChannel("y")))
+STICKS = SignalStream(
+    "labcrane.input", "Joystick", 240.0, (SignalChannel("left.x"), SignalChannel("left.y"))
+)
+CODES = SignalStream("labcrane.codes", "Markers", 0.0, (SignalChannel("code"),))
 LOAD = BandPowerSettings(
     stream="eeg", fallback={"ratio": 1.0}, channels=("Fz",), per_channels=("Pz",)
 )
@@ -34,6 +45,15 @@ HEART = HeartSettings(
 )
 SKIN = SkinSettings(stream="eda", fallback={"rate": 5.0}, channel="palm")
 PUPIL = PupilSettings(stream="eye", fallback={"change": 0.0}, channel="pupil", baseline_s=5.0)
+
+REGION = GazeRegionSettings(
+    stream="eye", fallback={"share": 0.5}, channels=("x", "y"), between_x=(0.4, 0.6),
+    between_y=(0.0, 0.5),
+)  # fmt: skip
+HANDS = StickActivitySettings(
+    stream="sticks", fallback={"rms_speed": 0.0, "moving": 0.0}, channels=("left.x", "left.y")
+)
+ANSWERS = DrtResponseSettings(stream="codes", fallback={"response_time": 0.5}, hit_s=(0.1, 2.55))
 
 
 def built(name: str, settings: EstimateSettings) -> Estimate:
@@ -144,6 +164,63 @@ class TestPupil(EstimateContract):
         return np.full((600, 1), 4.0)
 
 
+class TestGazeRegion(EstimateContract):
+    @pytest.fixture
+    def settings(self) -> EstimateSettings:
+        return REGION
+
+    @pytest.fixture
+    def estimate(self) -> Estimate:
+        return built("gaze_region", REGION)
+
+    @pytest.fixture
+    def stream(self) -> SignalStream:
+        return GAZE
+
+    @pytest.fixture
+    def clean(self) -> FloatArray:
+        return np.full((720, 2), 0.5)
+
+
+class TestStickActivity(EstimateContract):
+    @pytest.fixture
+    def settings(self) -> EstimateSettings:
+        return HANDS
+
+    @pytest.fixture
+    def estimate(self) -> Estimate:
+        return built("stick_activity", HANDS)
+
+    @pytest.fixture
+    def stream(self) -> SignalStream:
+        return STICKS
+
+    @pytest.fixture
+    def clean(self) -> FloatArray:
+        return np.full((2640, 2), 0.1)
+
+
+class TestDrtResponse(EstimateContract):
+    @pytest.fixture
+    def settings(self) -> EstimateSettings:
+        return ANSWERS
+
+    @pytest.fixture
+    def estimate(self) -> Estimate:
+        return built("drt_response", ANSWERS)
+
+    @pytest.fixture
+    def stream(self) -> SignalStream:
+        """Return the stream as if it had a sample each tenth of a second; it has no rate."""
+        return replace(CODES, rate_hz=10.0)
+
+    @pytest.fixture
+    def clean(self) -> FloatArray:
+        codes = np.ones((100, 1))
+        codes[[10, 15, 36], 0] = 112, 113, 114
+        return codes
+
+
 def test_the_ratio_is_that_of_the_amplitudes_squared() -> None:
     # One band has 4 bins of 1 Hz, the other 5: each sine is in one of them, smeared by the window.
     (ratio,) = values(BandPower(LOAD), EEG, eeg(20.0, 10.0))
@@ -180,6 +257,73 @@ def test_a_pupil_that_grows_by_a_tenth_has_a_change_of_a_tenth_and_blinks_are_le
     assert change == pytest.approx(0.1, abs=1e-9)
     size[530:] = 0.0
     assert math.isnan(values(Pupil(PUPIL), EYE, size)[0])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_share_of_the_gaze_is_that_of_the_samples_drawn_within_the_rectangle(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    inside = draw.random(660) < draw.random()
+    x = np.where(inside, draw.uniform(0.4, 0.6, 660), draw.choice([0.2, 0.39, 0.61, 1.4], 660))
+    y = draw.uniform(0.0, 0.5, 660)
+    x[seen := draw.random(660) < 0.1] = math.nan
+    (share,) = values(GazeRegion(REGION), GAZE, np.column_stack([x, y]))
+    assert share == pytest.approx(inside[60:][~seen[60:]].mean())
+    (nothing,) = values(GazeRegion(REGION), GAZE, np.full((660, 2), math.nan))
+    assert math.isnan(nothing)
+
+
+def test_two_sines_of_the_sticks_have_the_speed_and_the_share_of_a_closed_form() -> None:
+    t, step = np.arange(2640) / STICKS.rate_hz, HANDS.step_s
+    hertz, size = np.array([0.5, 1.3]), np.array([0.5, 0.3])
+    largest = 2.0 * size * np.sin(np.pi * hertz * step) / step  # speed of a sine over a step
+    axes = size * np.sin(2.0 * np.pi * hertz * t[:, None])
+    speed, _ = values(StickActivity(HANDS), STICKS, axes)
+    assert speed == pytest.approx(np.sqrt((largest**2 / 2.0).sum()), rel=0.01)
+    axes[:, 1] = 0.7  # held, but still
+    _, moving = values(StickActivity(HANDS), STICKS, axes)
+    assert moving == pytest.approx(
+        1.0 - 2.0 / np.pi * np.arcsin(HANDS.still / largest[0]), abs=0.01
+    )
+
+
+def test_a_stick_that_creeps_by_one_position_at_a_time_is_at_rest() -> None:
+    creeping = np.round(0.04 * np.arange(2640) / STICKS.rate_hz * 128.0) / 128.0
+    _, moving = values(StickActivity(HANDS), STICKS, np.column_stack([creeping, creeping]))
+    assert moving == 0.0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_response_time_is_the_mean_of_the_hits_drawn_in_the_window(seed: int) -> None:
+    """Stimuli that are missed, answered too early, or ended by a pause do not count."""
+    draw = np.random.default_rng(seed)
+    events, hits, onset = [], [], 1000.0
+    for _ in range(40):
+        kind = draw.choice(["hit", "miss", "cheat", "held"], p=[0.7, 0.1, 0.1, 0.1])
+        answer = {"hit": draw.uniform(0.1, 1.9), "cheat": 0.06, "held": 0.4}.get(kind, math.nan)
+        decided = draw.choice([1.2, 2.9]) if kind == "held" else 2.55 + 1 / 240
+        events += [(onset, 112.0), (onset + answer, 113.0), (onset + 0.01, 20.0)]
+        events += [(onset + 2.0, 113.0)] * (kind in {"hit", "cheat"})  # only the first one counts
+        events += [(onset + decided, 114.0)]
+        hits += [(onset, answer)] * (kind == "hit")
+        onset += draw.uniform(3.0, 5.0)
+    known = sorted(each for each in events if not math.isnan(each[0]))
+    times, codes = np.array([*known, (known[-1][0] - 0.5, 51.0)]).T  # one that is learnt late
+    estimate = DrtResponse(ANSWERS)
+    estimate.begin(CODES)
+    found = [estimate.update(times[[at]], codes[[at], None]) for at in range(len(times))][-1]
+    expected = [answer for begun, answer in hits if begun > known[-1][0] - ANSWERS.window_s]
+    assert found is not None
+    assert found.values[0] == pytest.approx(np.mean(expected))
+    assert found.time == known[-1][0]
+
+
+def test_without_a_hit_in_the_window_there_is_no_response_time() -> None:
+    estimate = DrtResponse(ANSWERS)
+    estimate.begin(CODES)
+    assert estimate.update(np.array([1.0]), np.array([[112.0]])) is None, "not decided yet"
+    found = estimate.update(np.array([3.56]), np.array([[114.0]]))
+    assert found is not None
+    assert math.isnan(found.values[0])
 
 
 def test_missing_samples_give_no_number() -> None:
