@@ -149,7 +149,7 @@ LIMITS: Mapping[str, Limit] = {
         5_000_000,
         "bytes",
         100,
-        "URDF or MJCF without a document type; 20,000 elements with what is repeated",
+        "URDF without a document type; 20,000 elements",
         "machines.descriptions.robot_xml",
         ERROR,
     ),

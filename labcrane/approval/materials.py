@@ -27,7 +27,7 @@ NAMELESS = frozenset({".obj", ".stl", ".pdf"})
 MOST_TEXT = 1_000_000
 """Bytes of a file of no known kind that may be YAML and name others."""
 
-ROBOTS = frozenset({".urdf", ".xml"})
+ROBOTS = frozenset({".urdf"})
 OF_THE_LAB = frozenset({"certificate", "key"})
 """Settings of a page that belong to the laboratory and stay out of the lock: everybody may read a
 lock but no one a private key, and a renewed certificate does not change the study."""
@@ -181,23 +181,17 @@ def _short_text(path: Path) -> str | None:
 
 
 def _named_by_robot(path: Path) -> Iterator[str]:
-    """Yield the files that a URDF or MJCF file names: meshes, textures, and what it includes."""
+    """Yield the files that a URDF file names: meshes and textures."""
     try:
-        elements = list(ElementTree.parse(path).iter())  # noqa: S314 - expat refuses entity bombs
+        root = ElementTree.parse(path)  # noqa: S314 - expat refuses entity bombs
     except (ElementTree.ParseError, ValueError):
         return  # not a robot: its reader reports it
-    folders = {""} | {
-        f"{element.get(key)}/"
-        for element in elements
-        for key in ("meshdir", "texturedir", "assetdir")
-        if element.get(key)
-    }
-    for element in elements:
-        for key in ("filename", "file"):
-            name = (element.get(key) or "").removeprefix("file://")
-            if name.startswith("package://"):
-                name = name.removeprefix("package://").partition("/")[2]
-            yield from (inside + name for inside in sorted(folders) if name)
+    for element in root.iter():
+        name = element.get("filename", "").removeprefix("file://")
+        if name.startswith("package://"):
+            name = name.removeprefix("package://").partition("/")[2]
+        if name:
+            yield name
 
 
 def _paths(text: str, beside: Path, folder: Path) -> list[Path]:

@@ -27,10 +27,9 @@ def find_machine(name: str, beside: Path | None = None) -> Path:
             f"machine file {str(path)!r} does not exist; paths are relative to the protocol's "
             "folder"
         )
-    if name.endswith((".urdf", ".xml")):
-        kind = "urdf" if name.endswith(".urdf") else "mjcf"
+    if name.endswith(".urdf"):
         raise ProtocolError(
-            f"machine is {name!r}, a robot's file; write machine: {{{kind}: {name}, joints: ..., "
+            f"machine is {name!r}, a robot's file; write machine: {{urdf: {name}, joints: ..., "
             "tip: ...}, with the study's names for its joints"
         )
     if name in machine_names():

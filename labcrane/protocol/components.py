@@ -251,13 +251,12 @@ def _elsewhere(machine: object, folder: Path) -> tuple[Place, str] | None:
 
     Files that come with labcrane are in its own folder.
     """
-    kinds: dict[Place, object] = {(): machine}
-    if isinstance(machine, Mapping):
-        kinds = {(kind,): machine.get(kind) for kind in ("urdf", "mjcf")}
-    for place, name in kinds.items():
-        if not isinstance(name, str) or (not place and not name.endswith(YAML)):
-            continue
-        for path in (folder / name, *used(folder / name)):
-            if why := outside(path, folder):
-                return place, f"{named(('machine', *place))} is {name!r}, and {why}"
+    described = isinstance(machine, Mapping)
+    place: Place = ("urdf",) if described else ()
+    name = machine.get("urdf") if isinstance(machine, Mapping) else machine
+    if not isinstance(name, str) or not (described or name.endswith(YAML)):
+        return None
+    for path in (folder / name, *used(folder / name)):
+        if why := outside(path, folder):
+            return place, f"{named(('machine', *place))} is {name!r}, and {why}"
     return None

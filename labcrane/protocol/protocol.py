@@ -197,7 +197,7 @@ class Protocol(Section):
 
     machine: Annotated[str | dict[str, Any], _AsDescribed()]
     """Name of a machine that comes with labcrane, or of a YAML file in the protocol's folder; or a
-    URDF or MJCF file with its joints: ``{urdf: arm.urdf, joints: [...], tip: hook}``."""
+    URDF file with its joints: ``{urdf: arm.urdf, joints: [...], tip: hook}``."""
 
     input: Use
     """The device that the operator moves."""

@@ -111,10 +111,6 @@ URDF = """\
 <robot name="arm"><link name="base"><visual><geometry>
 <mesh filename="package://arm_description/meshes/base.stl"/></geometry></visual></link></robot>
 """
-MJCF = """\
-<mujoco><compiler meshdir="solids"/><include file="more.xml"/>
-<asset><mesh name="boom" file="boom.stl"/></asset></mujoco>
-"""
 
 
 def test_the_meshes_that_a_robots_file_names_are_part_of_the_study(tmp_path: Path) -> None:
@@ -122,19 +118,13 @@ def test_the_meshes_that_a_robots_file_names_are_part_of_the_study(tmp_path: Pat
     files = {
         "robots/arm.urdf": URDF,
         "meshes/base.stl": "solid",
-        "digger/digger.xml": MJCF,
-        "digger/more.xml": "<mujoco/>",
-        "digger/solids/boom.stl": "solid",
         "meshes/of_another.stl": "solid",
     }
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text, encoding="utf-8")
-    for machine in ({"urdf": "robots/arm.urdf"}, {"mjcf": "digger/digger.xml"}):
-        (first,) = machine.values()
-        found = {
-            path.relative_to(tmp_path).as_posix()
-            for path in referred({"machine": machine}, tmp_path)
-        }
-        kind = "digger/" if "mjcf" in machine else ("robots/", "meshes/base.stl")
-        assert found == {name for name in files if name.startswith(kind)}, first
+    found = {
+        path.relative_to(tmp_path).as_posix()
+        for path in referred({"machine": {"urdf": "robots/arm.urdf"}}, tmp_path)
+    }
+    assert found == {"robots/arm.urdf", "meshes/base.stl"}

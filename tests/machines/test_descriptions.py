@@ -1,4 +1,4 @@
-"""Machines of URDF and MJCF files move as the engines that read the files say."""
+"""Machines of URDF files move as the engines that read the files say."""
 
 import json
 import math
@@ -21,10 +21,9 @@ OMX = {
     "tip": "gripper",
 }
 EXCAVATOR = {
-    "mjcf": "excavator.xml",
+    "urdf": "excavator.urdf",
     "joints": ["swing", "boom", "stick", "bucket"],
     "tip": "teeth",
-    "speeds_deg_s": {"swing": 60, "boom": 30, "stick": 40, "bucket": 60},
 }
 
 
@@ -136,7 +135,7 @@ def test_the_excavator_moves_and_weighs_as_mujoco_has_it() -> None:
 
     machine = described(EXCAVATOR)
     assert machine.joints[0].a == pytest.approx(0.25)
-    model = mujoco.MjModel.from_xml_path(str(EXAMPLES / "excavator.xml"))
+    model = mujoco.MjModel.from_xml_path(str(EXAMPLES / "excavator.urdf"))
     data = mujoco.MjData(model)
     own = mujoco.MjModel.from_xml_string(urdf_of(machine))
     there = mujoco.MjData(own)
@@ -144,7 +143,8 @@ def test_the_excavator_moves_and_weighs_as_mujoco_has_it() -> None:
     for angles in poses(machine):
         data.qpos[:] = signs * angles
         mujoco.mj_forward(model, data)
-        tip = data.site("teeth").xpos
+        bucket = data.body("bucket")
+        tip = bucket.xpos + bucket.xmat.reshape(3, 3) @ [1.5, 0.0, 0.0]
         assert Arm(machine).tip(angles) == pytest.approx(tip, abs=1e-9)
         there.qpos[:] = angles
         mujoco.mj_forward(own, there)
@@ -277,7 +277,7 @@ sessions: [{{name: only, steps: [{{block: {{task: aiming, pairs: 1}}}}]}}]
 
 
 @pytest.mark.parametrize("engine", ["kinematic_crane", "mujoco_crane", "bullet_crane"])
-def test_a_study_on_an_excavator_of_an_mjcf_file_is_checked_run_and_replayed(
+def test_a_study_on_an_excavator_of_a_file_is_checked_run_and_replayed(
     engine: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from needs import need
@@ -287,7 +287,7 @@ def test_a_study_on_an_excavator_of_an_mjcf_file_is_checked_run_and_replayed(
     need("mujoco", *(["pybullet"] if engine == "bullet_crane" else []))
     folder = tmp_path / "study"
     folder.mkdir()
-    (folder / "excavator.xml").write_text((EXAMPLES / "excavator.xml").read_text())
+    (folder / "excavator.urdf").write_text((EXAMPLES / "excavator.urdf").read_text())
     axes = "{swing: left.x, boom: -right.y, stick: left.y, bucket: right.x}"
     path = folder / "protocol.yaml"
     path.write_text(
@@ -300,7 +300,7 @@ def test_a_study_on_an_excavator_of_an_mjcf_file_is_checked_run_and_replayed(
     assert "excavator" in capsys.readouterr().out
     run = ["run", str(path), "--participant", "P001", "--simulate", "--fast"]
     assert main(run) == 0, capsys.readouterr()
-    (folder / "excavator.xml").unlink()  # the record alone is enough
+    (folder / "excavator.urdf").unlink()  # the record alone is enough
     recording = folder / "data" / "P001-SIMULATED" / "P001-SIMULATED.h5"
     capsys.readouterr()
     assert main(["replay", str(recording)]) == 0, capsys.readouterr()
@@ -359,71 +359,6 @@ def test_a_joint_that_mimics_one_that_stays_or_is_elsewhere_changes_nothing(tmp_
     plain = levelled(tmp_path, "")
     beside = levelled(tmp_path, '<mimic joint="end"/>', '<mimic joint="lift"/>')
     assert beside.joints == plain.joints
-
-
-HINGED = """\
-<mujoco><compiler angle="radian"/><worldbody>
- <body name="post"><joint name="slew" axis="0 0 1" range="-2 2"/><geom size=".1" mass="9"/>
-  <body name="boom" pos=".2 0 .3"><joint name="lift" axis="0 1 0" range="-1 1"/>
-   <geom name="drum" size=".1" mass="9"/><site name="eye" pos=".6 0 .4"/>
-   <body name="bar" pos=".5 0 0"><joint name="bar" axis="0 1 0"/><geom size=".1" mass="1"/>
-    <site name="bar" pos=".5 0 0"/></body>
-   <body name="stick" pos="2 0 0"><joint name="reach" axis="0 1 0" range="-1 1"/>
-    <geom size=".1" mass="9"/>
-    <body name="plate" pos="1 0 0">{plate}<geom size=".1" mass="9"/><site name="fork" pos=".6 0 0"/>
- </body></body></body></body></worldbody>
- <tendon><fixed name="both"><joint joint="{last}" coef="1"/><joint joint="lift" coef="1"/></fixed>
-  <spatial name="rope"><site site="eye"/><geom geom="drum"/><site site="fork"/></spatial>
-  <spatial name="beside"><site site="eye"/><site site="bar"/></spatial>
- </tendon>
- <equality>{equality}</equality></mujoco>
-"""
-LEVEL = '<joint name="level" axis="0 1 0" range="-2 2"/>'
-
-
-def hinged(folder: Path, equality: str, plate: str = LEVEL) -> Machine:
-    last = "level" if plate else "reach"
-    (folder / "arm.xml").write_text(HINGED.format(equality=equality, plate=plate, last=last))
-    joints = ["slew", "lift", "reach"]
-    speeds, efforts = dict.fromkeys(joints, 30.0), dict.fromkeys(joints, 100.0)
-    fields = {"mjcf": "arm.xml", "joints": joints, "tip": "fork"}
-    return described({**fields, "speeds_deg_s": speeds, "efforts": efforts}, folder)
-
-
-@needs("mujoco")
-@pytest.mark.parametrize(
-    ("equality", "plate", "said"),
-    [
-        ('<joint joint1="level" joint2="lift" polycoef="0 -1 0 0 0"/>', LEVEL, "moves with lift"),
-        ('<joint joint1="level" polycoef="0.5 0 0 0 0"/>', LEVEL, "'level' .* is held"),
-        ('<joint joint1="reach" joint2="lift"/>', "", "'lift' .* moves with reach"),
-        ('<tendon tendon1="both"/>', LEVEL, "'level' .* moves with lift .equality: tendon"),
-        ('<tendon tendon1="both"/>', "", "'lift' .* moves with reach .equality: tendon"),
-        ('<tendon tendon1="rope"/>', LEVEL, "'level' .* moves with reach .equality: tendon"),
-        ('<tendon tendon1="rope"/>', "", "'reach' .* is held .equality: tendon"),
-        ('<joint joint1="reach"/>', "", "'reach' .* is held .equality: joint"),
-        ('<connect body1="bar" body2="plate" anchor="0 0 .3"/>', LEVEL, "equality: connect"),
-        ('<weld body1="bar" body2="plate"/>', LEVEL, "'level' .* moves with bar and reach"),
-    ],
-)
-def test_a_joint_that_an_equality_moves_on_the_way_to_the_tip_is_refused(
-    equality: str, plate: str, said: str, tmp_path: Path
-) -> None:
-    with pytest.raises(ProtocolError, match=said):
-        hinged(tmp_path, equality, plate)
-
-
-@needs("mujoco")
-def test_an_equality_that_moves_no_joint_on_the_way_changes_nothing(tmp_path: Path) -> None:
-    plain = hinged(tmp_path, "")
-    for equality in (
-        '<joint joint1="bar" joint2="lift"/>',
-        '<joint joint1="level"/>',
-        '<tendon tendon1="beside"/>',
-        '<connect body1="bar" body2="stick" anchor="0 0 .3"/>',
-        '<joint joint1="level" joint2="lift" active="false"/>',
-    ):
-        assert hinged(tmp_path, equality).joints == plain.joints
 
 
 def test_the_rounding_of_a_file_is_taken_and_said(tmp_path: Path) -> None:

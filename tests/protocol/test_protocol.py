@@ -90,7 +90,6 @@ def test_the_protocol_of_these_tests_is_fine(complaint) -> None:
         ("- name: first", "- after_days: 1\n    name: first", "17:17: sessions[1].after_days: it is 1; write the earliest and the latest day, as [1, 1]"),
         ("task: aiming, repeat: 2", "task: aiming, feedback: visual", "21:41: sessions[1].steps[3].block.feedback: it is 'visual'; write all, none, group for what the participant's own group is given, or a list of names: [visual]"),
         ("machine: ch8", "machine: arm.urdf", "6:10: machine is 'arm.urdf', a robot's file; write machine: {urdf: arm.urdf, joints: ..., tip: ...}, with the study's names for its joints"),
-        ("machine: ch8", "machine: arm.xml", "6:10: machine is 'arm.xml', a robot's file; write machine: {mjcf: arm.xml, joints: ..., tip: ...}, with the study's names for its joints"),
         ("labcrane: 1", "labcrane_cohort: 1", "1:1: the file is a cohort of simulated operators, and not a protocol; give the protocol"),
         ("labcrane: 1", "labcrane_scene: 1", "1:1: the file is a scene, and not a protocol; give the protocol"),
         ("study: aiming", "study: Aiming Study", None),

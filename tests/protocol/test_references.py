@@ -576,7 +576,6 @@ TRACK = "design:\n  tracks: {t: {factor: pairs, levels: {2m_far_left: 2, 4m_far_
         ("design:", TRACK % "up_down: {}, measure: movement_time, at_least: 3, at_most: 2", "2}}", "no trial is a success"),
         ("design:", TRACK % "up_down: {reversals: 30}, rounds: 20", "30}, rounds", "there are 20 rounds"),
         ("design:", TRACK % "up_down: {}, rounds: 5", "5}}", "there are 5 rounds"),
-        ("machine: ch8 ", "machine: {urdf: a.urdf, joints: [a, b, c], tip: t, mjcf: a.xml} ", "a.xml", "described by one file"),
         ("design:", "streams: {a: {type: EEG, evening: forbid, min_delay_s: 0.01}}\ndesign:", "0.01}", "or do not write evening: forbid"),
         ("design:", "streams: {a: {type: EEG, stamped: at_sampling, min_delay_s: 0.01}}\ndesign:", "at_sampling", "keeps timestamps as they are"),
     ],

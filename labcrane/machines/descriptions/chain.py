@@ -25,6 +25,9 @@ NEARLY = 1e-6
 
 ROUNDING = 1e-12
 
+CENTRE_DECIMALS = 12
+"""Of a centre of mass in m: Bullet refuses a body whose inertia the rest makes unsymmetric."""
+
 
 class ChainError(ValueError):
     """The joints of a file are not a slewing base with pitch joints.
@@ -35,24 +38,6 @@ class ChainError(ValueError):
     def __init__(self, message: str, *, name: str = "") -> None:
         super().__init__(message)
         self.name = name
-
-
-def coupled(name: str, others: str, what: str) -> ChainError:
-    """Return why a joint on the way to the tip cannot be driven or left where it is.
-
-    Parameters
-    ----------
-    others
-        The joints that it moves with; empty where it is held.
-    what
-        The entry in the file that says so.
-    """
-    how = f"moves with {others}" if others else "is held"
-    return ChainError(
-        f"joint {name!r} on the way to the tip {how} ({what}), which is not followed here: the tip "
-        "would be somewhere else; name a tip before it, or a file without this coupling",
-        name=name,
-    )
 
 
 @dataclass(frozen=True)
@@ -261,7 +246,7 @@ def _joint(
         "effort": axis.effort,
         "thickness": thickness,
         **({"mesh": _mesh(axis.look, far)} if axis.look else {}),
-        "centre_m": centre.tolist(),
+        "centre_m": np.round(centre, CENTRE_DECIMALS).tolist(),
         "inertia_kgm2": [
             *np.diag(inertia).tolist(), inertia[0, 1], inertia[0, 2], inertia[1, 2],
         ],

@@ -1,14 +1,12 @@
-"""Description of a machine in a protocol: a URDF or MJCF file, and which joints are driven."""
+"""Description of a machine in a protocol: a URDF file, and which joints are driven."""
 
 import json
 import math
 from pathlib import Path
-from typing import Any
 
-from pydantic import Field, PositiveFloat, ValidationError, model_validator
+from pydantic import Field, PositiveFloat, ValidationError
 
 from labcrane.errors import ProtocolError, nearest
-from labcrane.files.complaints import WrongKey
 from labcrane.files.model import StrictModel
 from labcrane.files.system import is_file
 from labcrane.machines.machine import FEWEST_JOINTS, Machine
@@ -17,18 +15,15 @@ from labcrane.machines.machine import FEWEST_JOINTS, Machine
 class MachineDescription(StrictModel):
     """A machine of another program's file: ``{urdf: arm.urdf, joints: [...], tip: hook}``."""
 
-    urdf: str | None = None
+    urdf: str
     """A URDF file; paths are relative to the protocol's folder."""
-
-    mjcf: str | None = None
-    """An MJCF file, which is read by MuJoCo."""
 
     joints: tuple[str, ...] | dict[str, str] = Field(min_length=FEWEST_JOINTS)
     """Joints that are driven, from the base outward, by their names in the file; as a mapping, the
     study's names for them come first: ``{slew: joint_1}``."""
 
     tip: str
-    """Link (URDF), site or body (MJCF) whose origin is the tip."""
+    """Link whose origin is the tip."""
 
     title: str = ""
     """Name of the machine; the name in the file by default."""
@@ -37,7 +32,7 @@ class MachineDescription(StrictModel):
     """Joint angles at which a session begins, in degrees, by the study's names; 0 by default."""
 
     speeds_deg_s: dict[str, PositiveFloat] = Field(default_factory=dict)
-    """Largest joint speeds, in degrees per second, instead of the file's; MJCF has none."""
+    """Largest joint speeds, in degrees per second, instead of the file's."""
 
     efforts: dict[str, PositiveFloat] = Field(default_factory=dict)
     """Largest joint torques, in newton metres, instead of the file's."""
@@ -47,13 +42,6 @@ class MachineDescription(StrictModel):
 
     meshes: bool = True
     """Whether links look like the first mesh that a URDF file gives them: STL or OBJ."""
-
-    @model_validator(mode="after")
-    def _is_one_file(self) -> "MachineDescription":
-        if (self.urdf is None) == (self.mjcf is None):
-            at = () if self.urdf is None else ("mjcf",)
-            raise WrongKey("a machine is described by one file; write urdf or mjcf", at=at)
-        return self
 
     def _check_names(self) -> None:
         for key in ("rest_deg", "speeds_deg_s", "efforts"):
@@ -76,11 +64,6 @@ class MachineDescription(StrictModel):
             return self.joints
         return {name: name for name in self.joints}
 
-    @property
-    def file(self) -> str:
-        """The file that describes it."""
-        return self.urdf or self.mjcf or ""
-
     def read(self, folder: Path) -> tuple[Machine, str]:
         """Return the machine, and its own YAML.
 
@@ -95,17 +78,18 @@ class MachineDescription(StrictModel):
             machine_fields,
             rounding,
         )
+        from labcrane.machines.descriptions.urdf_file import UrdfFile  # noqa: PLC0415
 
-        path = folder / self.file
+        path = folder / self.urdf
         if not is_file(path):
             raise ProtocolError(
                 f"machine file {str(path)!r} does not exist; paths are relative to the protocol's "
                 "folder",
-                at=("mjcf" if self.urdf is None else "urdf",),
+                at=("urdf",),
             )
         self._check_names()
         try:
-            found = self._file(path, folder)
+            found = UrdfFile(path, folder, meshes=self.meshes)
             speeds = {name: math.radians(each) for name, each in self.speeds_deg_s.items()}
             axes = found.axes(self.names, self.tip, speeds, self.efforts)
             tip = found.tip(self.tip)
@@ -128,12 +112,3 @@ class MachineDescription(StrictModel):
                 f"{path} as a machine: {where}: {what}",
                 at=(key, named) if written else self.place(named),
             ) from error
-
-    def _file(self, path: Path, folder: Path) -> Any:
-        if self.urdf is not None:
-            from labcrane.machines.descriptions.urdf_file import UrdfFile  # noqa: PLC0415
-
-            return UrdfFile(path, folder, meshes=self.meshes)
-        from labcrane.machines.descriptions.mjcf_file import MjcfFile  # noqa: PLC0415
-
-        return MjcfFile(path, folder)

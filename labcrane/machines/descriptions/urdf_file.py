@@ -20,10 +20,9 @@ from labcrane.machines.descriptions.chain import (
     ChainError,
     LinkMesh,
     Mass,
-    coupled,
     together,
 )
-from labcrane.machines.descriptions.robot_xml import check_robot
+from labcrane.machines.descriptions.robot_xml import read_robot
 from labcrane.machines.machine import impossible
 from labcrane.types import FloatArray
 
@@ -52,7 +51,7 @@ class UrdfFile:
 
     def __init__(self, path: Path, folder: Path, *, meshes: bool = True) -> None:
         self._path, self._folder, self._meshes = path.resolve(), folder.resolve(), meshes
-        root = check_robot(path, folder)
+        root = read_robot(path)
         if root.tag != "robot":
             raise ChainError(f"it is not URDF: its root is <{root.tag}> and must be <robot>")
         if any("xacro" in str(each.tag) for each in root.iter()):
@@ -133,7 +132,12 @@ class UrdfFile:
                     )
                 seen.add(leader)
             if leader != name and (name in driven or leader in driven or apart):
-                raise coupled(name, leader, "mimic")
+                raise ChainError(
+                    f"joint {name!r} on the way to the tip moves with {leader} (mimic), which is "
+                    "not followed here: the tip would be somewhere else; name a tip before it, or "
+                    "a file without this coupling",
+                    name=name,
+                )
 
     def _axis(
         self,
