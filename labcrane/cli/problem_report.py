@@ -13,7 +13,6 @@ import re
 import sys
 import traceback
 import zipfile
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -21,15 +20,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from labcrane.core.findings import Verdict
 from labcrane.doctor.report import Diagnosis
-from labcrane.doctor.versions import LIBRARIES, commit, liblsl, libraries
+from labcrane.doctor.versions import commit, liblsl, libraries
 from labcrane.errors import RecordingError
 from labcrane.files.atomic import replacing
 from labcrane.recording.crash_marker import crash_marker_path, read_crash_marker
-from labcrane.recording.foreign_streams import RecordedStream, read_streams
+from labcrane.recording.foreign_streams import read_streams
 from labcrane.recording.journal_reader import JournalState, SessionLog, read_journal
 from labcrane.recording.paths import journal_path, parts, session_of
 from labcrane.registry.entry_points import entry_points_of
@@ -45,7 +42,7 @@ EVENTS = frozenset(
         "trigger.flood", "trigger.back", "page.denied", "launcher.gone", "loop.stalled",
     ]
 )  # fmt: skip
-"""Events of a session that go in; all others are only counted together."""
+"""Events of a session that go in."""
 
 NUMBERS = (
     "died_in_tick", "step", "block", "trial", "attempt", "paused", "late_ticks", "worst_lateness",
@@ -68,17 +65,11 @@ TEXTS = ("clock", "scheduling")
 OTHER = "(another)"
 """Takes the place of a name that is not labcrane's."""
 
-WORST = 20
-"""Ticks that are listed as the latest."""
-
-MINUTE_S = 60.0
-
 README = """\
 Problem report of labcrane.
 
 It has versions and the verdicts of labcrane doctor. Of one session it has the events of the
-program, when steps and trials began and ended, the timing of the loop and of streams, and the state
-of the journals. Of an error it has its type and the places in labcrane's code, but not its message.
+program, when steps and trials began and ended, and the state of the journals. Of an error it has its type and the places in labcrane's code, but not its message.
 It has no pseudonyms, answers, notes, results, positions, names, paths or texts of a study: if a
 message explains the fault, read it and send it beside this file.
 """
@@ -142,15 +133,13 @@ def compose(
     missing = [] if found else ["what labcrane doctor finds: it failed"]
     files = {"versions.txt": versions, "doctor.json": lambda: _json(_findings(found, trouble))}
     if session is not None:
-        log, streams, states, unread = _read(session)
+        log, states, unread = _read(session)
         missing += [f"a journal of the session: {kind}" for kind in unread]
         files |= {
             "session/about.json": lambda: _json(_about(session, log, states, unread)),
-            "session/timing.json": lambda: _json(_timing(log)),
             "session/events.jsonl": lambda: "".join(
                 f"{json.dumps(each)}\n" for each in _events(log)
             ),
-            "session/streams.json": lambda: _json([_stream(each) for each in streams]),
         }
     made = {name: _tried(name, make, missing) for name, make in files.items()}
     lines = "".join(f"Missing: {each}.\n" for each in missing)
@@ -245,35 +234,32 @@ def _json(value: object) -> str:
 
 def _read(
     session: FoundSession,
-) -> tuple[SessionLog, list[RecordedStream], list[JournalState], dict[str, Exception]]:
+) -> tuple[SessionLog, list[JournalState], dict[str, Exception]]:
     """Return what the journals say, and what could not be read: that may be the problem."""
-    log, streams = SessionLog(), list[RecordedStream]()
-    states, unread = list[JournalState](), dict[str, Exception]()
+    log, states, unread = SessionLog(), list[JournalState](), dict[str, Exception]()
     for kind in ("run", "streams"):
         paths = parts(journal_path(session.folder, session.number, kind))
         try:
             if kind == "run":
                 log, found = read_journal(paths)
             else:
-                streams, found = read_streams(paths)
+                _, found = read_streams(paths)
         except Exception as error:  # noqa: BLE001 - any fault may be what the report is about
             unread[kind] = error
         else:
             states += found
-    return log, streams, states, unread
+    return log, states, unread
 
 
 def _findings(found: Diagnosis | None, trouble: Sequence[Exception]) -> dict[str, Any]:
     failed = {"failed": [places(each) for each in trouble]}
-    return failed | ({"checks": _checks(found.as_data()["checks"])} if found else {})
-
-
-def _checks(checks: Iterable[Mapping[str, Any]]) -> list[dict[str, str]]:
-    """Return the verdicts of the doctor, and the texts that quote neither a name nor an error."""
-    return [_check(check["area"], check["verdict"], check["text"]) for check in checks]
+    checks = found.as_data()["checks"] if found else ()
+    lines = [_check(check["area"], check["verdict"], check["text"]) for check in checks]
+    return failed | ({"checks": lines} if found else {})
 
 
 def _check(area: str, verdict: str, text: str) -> dict[str, str]:
+    """Return a verdict of the doctor, and its text where it quotes neither a name nor an error."""
     kind = area.partition(" ")[0]
     line = {"area": kind if kind in AREAS else OTHER, "verdict": str(Verdict(verdict))}
     return line | ({"text": text} if area in TEXTS and verdict != Verdict.FAIL else {})
@@ -286,30 +272,16 @@ def _about(
     unread: Mapping[str, Exception],
 ) -> dict[str, Any]:
     """Return what a session was made of, and how its journals were found."""
-    context = log.context
     marker = read_crash_marker(
         crash_marker_path(journal_path(session.folder, session.number, "run"))
     )
     plugin = marker.place.plugin if marker and marker.place else PROJECT
-    counted = Counter(each.name if each.name in EVENTS else OTHER for each in log.events)
     return {
         "session": session.number,
-        **_numbers(context, ABOUT),
-        "versions": {
-            name: version
-            for name, version in context.get("versions", {}).items()
-            if name in {PROJECT, *LIBRARIES} and re.fullmatch(r"[\d.]+", str(version))
-        },
-        "plugins": sorted(
-            _plugin(each.get("plugin")) for each in context.get("components", {}).values()
-        ),
-        "doctor_at_start": _checks(
-            ((context.get("doctor") or {}).get("at_start") or {}).get("checks", [])
-        ),
+        **_numbers(log.context, ABOUT),
         "journals": [asdict(each) | {"name": session_of(Path(each.name))} for each in states],
         "not_read": {kind: places(error) for kind, error in unread.items()},
         "died_in": marker and {"tick": marker.tick, "plugin": _plugin(plugin)},
-        "events_counted": dict(sorted(counted.items())),
     }
 
 
@@ -334,48 +306,3 @@ def _events(log: SessionLog) -> Iterator[dict[str, Any]]:
                 "event": event.name,
                 **_numbers(event.data, NUMBERS),
             }
-
-
-def _timing(log: SessionLog) -> dict[str, Any]:
-    """Return how late ticks were, as a whole, in each minute, and the latest ones; in ms."""
-    columns = {name: log.column("loop", name) for name in ("tick", "due", "woke", "wrote")}
-    tick, due, woke, wrote = columns.values()
-    if tick is None or due is None or woke is None or wrote is None or not len(due):
-        return {"ticks": 0}
-    late, writes = 1e3 * (woke - due), 1e3 * wrote
-    minutes = ((due - due[0]) // MINUTE_S).astype(int)
-    latest = np.argsort(-late, kind="stable")[:WORST]
-    return {
-        "ticks": len(due),
-        "lateness_ms": _spread(late),
-        "write_ms": _spread(writes),
-        "minutes": [
-            {"minute": int(one), "lateness_ms": _spread(late[minutes == one])}
-            for one in np.unique(minutes)
-        ],
-        "latest": [
-            {"tick": int(tick[at]), "lateness_ms": round(float(late[at]), 3)} for at in latest
-        ],
-    }
-
-
-def _spread(values: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, float]:
-    return {
-        "median": round(float(np.median(values)), 3),
-        "p99": round(float(np.quantile(values, 0.99)), 3),
-        "most": round(float(np.max(values)), 3),
-    }
-
-
-def _stream(stream: RecordedStream) -> dict[str, Any]:
-    """Return how a stream of others came, without its name and what it measured."""
-    trips = stream.probes[:, 2]
-    return {
-        "channels": len(stream.header.channels),
-        "rate_hz": stream.header.rate_hz,
-        "samples": len(stream.time_raw),
-        "probes": len(trips),
-        "round_trip_ms": _spread(1e3 * trips) if len(trips) else None,
-        "parts": len(stream.starts),
-        "notes": len(stream.notes),
-    }

@@ -105,22 +105,13 @@ def test_nothing_of_people_is_in_any_byte_of_the_report_of_a_session(here: Path)
     run(visit, ScriptedConsole({50: [Command(Order.NOTE, f"{PERSON} {NOTE}")]}))
     archive = report("--protocol", protocol, "--yes")
     assert planted_in(archive) == []
-    timing = json.loads(file_of(archive, "session/timing.json"))
-    assert timing["ticks"] > 100
     about = json.loads(file_of(archive, "session/about.json"))
-    assert about["versions"]["numpy"] in file_of(archive, "versions.txt")
     assert [each["damaged"] for each in about["journals"]] == [0] * len(about["journals"])
     kept = events_of(archive)
     assert {each["event"] for each in kept} >= {"session.start", "trial.end", "session.end"}
     fields = {key for each in kept for key in each}
     assert "late_ticks" in fields
     assert not fields & {"text", "outcome", "movement_time", "value"}
-    ours = {"joystick", "mujoco", "aiming", "bullet", "schemes", "sphere", "operator", "keyboard"}
-    assert set(about["plugins"]) & ours
-
-
-TICKS = 240
-"""A session that is killed has run for a second."""
 
 
 @pytest.fixture(scope="module")
@@ -133,10 +124,7 @@ def killed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     second = labcrane(*words, "--session", 2, cwd=folder)
     journal = folder / "data" / f"{PERSON}-SIMULATED" / "ses-02_run.xdf"
     wait_for(lambda: journal.exists() and b'"trial.start"' in journal.read_bytes())
-    # Frames are written a moment after their ticks: both must be in the report.
-    wait_for(
-        lambda: (begun := read_crash_marker(crash_marker_path(journal))) and begun.tick > TICKS
-    )
+    wait_for(lambda: read_crash_marker(crash_marker_path(journal)))
     kill_all(second)
     second.communicate(timeout=120)
     yield folder
@@ -154,7 +142,6 @@ def test_nothing_of_people_is_in_any_byte_of_the_report_of_a_killed_session(kill
     names = [each["event"] for each in events_of(archive)]
     assert "trial.start" in names
     assert "session.end" not in names
-    assert json.loads(file_of(archive, "session/timing.json"))["lateness_ms"]["most"] > 0
 
 
 def test_without_a_terminal_nothing_is_written_unless_yes_is_said(
@@ -241,8 +228,6 @@ def test_only_named_events_go_in_and_only_their_named_fields(here: Path) -> None
     }
     assert slow["calls"] == 4
     assert "why" not in slow
-    counted = json.loads(file_of(archive, "session/about.json"))["events_counted"]
-    assert counted == {"(another)": 2, "plugin.slow": 1, "session.start": 1, "trial.end": 1}
     assert not {"order.note", "questionnaire.answer"} & EVENTS
 
 

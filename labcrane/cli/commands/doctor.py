@@ -200,8 +200,8 @@ def report_problem(
 ) -> None:
     """Write an archive for a bug report, with nothing of people in it.
 
-    It is shown before it is written. It has versions, the doctor's verdicts, and the events and
-    timing of the last session: no text that a person wrote, no names, and no messages of errors.
+    It is shown before it is written. It has versions, the doctor's verdicts, and the events
+    of the last session: no text that a person wrote, no names, and no messages of errors.
     """
     from labcrane.cli.problem_report import (
         check_new,
