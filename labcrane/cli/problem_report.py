@@ -69,7 +69,8 @@ README = """\
 Problem report of labcrane.
 
 It has versions and the verdicts of labcrane doctor. Of one session it has the events of the
-program, when steps and trials began and ended, and the state of the journals. Of an error it has its type and the places in labcrane's code, but not its message.
+program, when steps and trials began and ended, and the state of the journals. Of an error it has
+its type and the places in labcrane's code, but not its message.
 It has no pseudonyms, answers, notes, results, positions, names, paths or texts of a study: if a
 message explains the fault, read it and send it beside this file.
 """
