@@ -56,34 +56,12 @@ def pages(
             f"the pages are served on {where.host} without TLS: others on that network can read "
             "them; set page: certificate and key"
         )
-    _check_logo(visit.study.path, where)
     handle = PageHandle(order, console.give, say, lambda: launcher.streams_status)
     console.listeners.append(handle.tell)
     try:
         yield
     finally:
         handle.close(left_behind(visit, launcher.outcome, launcher.sync_report))
-
-
-def _check_logo(protocol: Path, where: "PageSettings") -> None:
-    """Raise :class:`ProtocolError` where the logo of the pages is not there, or no picture's size.
-
-    This is checked before a session: a page without its logo looks broken.
-    """
-    if where.logo is None:
-        return
-    logo = protocol.parent / where.logo
-    if not logo.is_file():
-        raise ProtocolError(
-            f"there is no logo {str(logo)!r}; paths are relative to the protocol's folder"
-        )
-    from labcrane.protocol.pages import MOST_LOGO
-
-    if (size := logo.stat().st_size) > MOST_LOGO:
-        raise ProtocolError(
-            f"the logo {str(logo)!r} has {size:,} bytes, and pages show {MOST_LOGO:,} at most; "
-            "make it smaller"
-        )
 
 
 def left_behind(

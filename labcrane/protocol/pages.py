@@ -1,30 +1,15 @@
 """Settings of the pages: where they are served."""
 
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from labcrane.core.settings import Names, Settings, StudyPath, WrongKey, was_run
-from labcrane.errors import ProtocolError
-from labcrane.files.system import is_file
-from labcrane.machines.machine import Machine
+from labcrane.core.settings import Settings, WrongKey, was_run
 
 Language = Literal["en", "de", "pl", "fr", "es"]
 
-
-PICTURES: Mapping[str, bytes] = {
-    ".png": b"\x89PNG\r\n\x1a\n",
-    ".jpg": b"\xff\xd8\xff",
-    ".jpeg": b"\xff\xd8\xff",
-    ".svg": b"<svg",
-}
-"""Signature of a picture's format, by its file ending; in an SVG it may be anywhere."""
-
-MOST_LOGO = 2_000_000
-"""Bytes: every tablet loads it."""
 
 READABLE = 4.5
 """Contrast of text and background that WCAG 2.2 requires at AA."""
@@ -81,10 +66,6 @@ class PageSettings(Settings):
     """The study's colour on the participant's page, as ``#rrggbb``: dark enough for white text on
     it (contrast 4.5 to 1)."""
 
-    logo: StudyPath | None = None
-    """The study's logo on the participant's page, PNG, JPEG or SVG; a path counts from the
-    protocol."""
-
     @field_validator("host")
     @classmethod
     def _is_an_address(cls, host: str, info: ValidationInfo) -> str:
@@ -114,37 +95,9 @@ class PageSettings(Settings):
             )
         return colour
 
-    @field_validator("logo")
-    @classmethod
-    def _is_a_picture(cls, logo: Path | None) -> Path | None:
-        if logo is not None and logo.suffix.lower() not in PICTURES:
-            raise ValueError(
-                f"{logo.name!r} is not a picture that pages show; use {', '.join(PICTURES)}"
-            )
-        return logo
-
     @model_validator(mode="after")
     def _both_or_none(self) -> Self:
         if (self.certificate is None) != (self.key is None):
             there = "key" if self.certificate is None else "certificate"
             raise WrongKey("certificate and key belong together: give both, or none", at=(there,))
         return self
-
-    def needs(self, machine: Machine) -> Names:
-        """Look into the logo: a page with a hole looks broken."""
-        if self.logo is not None and is_file(self.logo):
-            raw, kind = self.logo.read_bytes(), self.logo.suffix.lower()
-            if len(raw) > MOST_LOGO:
-                raise ProtocolError(
-                    f"the logo {self.logo.name!r} has {len(raw):,} bytes, and pages show "
-                    f"{MOST_LOGO:,} at most; make it smaller",
-                    at=("logo",),
-                )
-            sign = PICTURES[kind]
-            if not (sign in raw if kind == ".svg" else raw.startswith(sign)):
-                raise ProtocolError(
-                    f"page.logo is {self.logo.name!r}, but its content is not {kind[1:].upper()}; "
-                    "export the picture again",
-                    at=("logo",),
-                )
-        return {}

@@ -20,9 +20,6 @@ def participant_page(context: PageContext) -> None:
     ui.add_css(STYLE)
     prepare(page.language, "drafts")
     with ui.column().classes("form-page w-full max-w-4xl mx-auto p-4 gap-4"):
-        if page.logo is not None:
-            logo = ui.element("img").classes("form-logo")
-            logo.props["src"], logo.props["alt"] = "/logo", context.study.protocol.title
         with ui.element("h1").classes("form-study"):
             ui.label(context.study.protocol.title or context.study.protocol.study)
         ConsentCard(context, PARTICIPANT).build()

@@ -6,7 +6,7 @@ What is answered is checked as in a session, and kept nowhere.
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from fastapi import FastAPI, Response
+from fastapi import FastAPI
 from nicegui import ui
 
 from labcrane.core.records import Event
@@ -85,12 +85,6 @@ def serve(study: Study, plan: SessionPlan, port: int, say: Callable[[str], None]
             ui.label(shown).classes("whitespace-pre-wrap text-lg p-4").props('id="text"')
 
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-
-    @app.get("/logo")
-    def logo() -> Response:
-        """Give the study's own logo."""
-        named = study.protocol.page.logo
-        return Response(named.read_bytes() if named else b"", 200 if named else 404)
 
     build_pages(app)
     serve_here(app, PARTICIPANT, port, say)

@@ -244,7 +244,7 @@ def _routes(app: Any, context: PageContext, opened: Callable[[int], None]) -> No
 
 
 def _files(app: Any, context: PageContext) -> None:
-    """Serve the two files of the study that pages show, and no other one."""
+    """Serve the one file of the study that pages show, and no other one."""
     from fastapi import Response  # noqa: PLC0415
 
     @app.get("/consent")  # type: ignore[untyped-decorator]  # app may be any ASGI app
@@ -255,15 +255,6 @@ def _files(app: Any, context: PageContext) -> None:
         text = read_lock(context.study.path).consent
         kind, _ = mimetypes.guess_type(text.name)
         return Response(text.read_bytes(), media_type=kind or "application/octet-stream")
-
-    @app.get("/logo")  # type: ignore[untyped-decorator]  # app may be any ASGI app
-    def logo() -> Response:
-        """Give the study's own logo."""
-        named = context.study.protocol.page.logo
-        if named is None:
-            return Response("the study has no logo", NOT_FOUND)
-        kind, _ = mimetypes.guess_type(named.name)
-        return Response(named.read_bytes(), media_type=kind)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,6 @@
 """Settings of a view."""
 
-import os
 from collections.abc import Mapping
-from pathlib import Path
 from string import ascii_lowercase, digits
 from typing import Annotated, Literal
 
@@ -12,12 +10,11 @@ from pydantic import (
     NonNegativeInt,
     PositiveFloat,
     ValidationInfo,
-    field_validator,
     model_validator,
 )
 from pydantic import PositiveInt as Pixels
 
-from labcrane import Machine, ProtocolError, Settings
+from labcrane import Machine, Settings
 from labcrane.core import (
     CameraName,
     EventName,
@@ -27,7 +24,6 @@ from labcrane.core import (
     Preset,
     Reference,
     SceneObject,
-    StudyPath,
     Unit,
     Usual,
     WrongKey,
@@ -118,32 +114,6 @@ KEYS = (
 
 Key = Annotated[str, Reference("key", own=True)]
 """A key of the keyboard."""
-
-FONTS = (".ttf", ".otf", ".ttc", ".pfb", ".pfa", ".woff", ".fon")
-
-OTHER_FONTS = (b"ttcf", b"wOFF", b"\x80\x01", b"%!", b"MZ")
-"""First bytes of font files other than plain TrueType and OpenType."""
-
-
-def _is_file(path: Path) -> bool:
-    return os.path.isfile(path)  # noqa: PTH113 - an impossible name is not an error here
-
-
-def _no_font(path: Path) -> str:
-    """Return why a file is not a font; empty if it looks like one."""
-    raw = path.read_bytes()
-    if raw.startswith(OTHER_FONTS):
-        return ""
-    if raw[:4] not in {b"\0\1\0\0", b"true", b"OTTO"}:
-        return "is not a font"
-    count = int.from_bytes(raw[4:6], "big")
-    records = [raw[at : at + 16] for at in range(12, 12 + 16 * count, 16)]
-    ends = [
-        int.from_bytes(each[8:12], "big") + int.from_bytes(each[12:], "big") for each in records
-    ]
-    whole = records and len(records[-1]) == len(records[0]) and max(ends) <= len(raw)
-    return "" if whole else "is cut off"
-
 
 ENTERING = ("target.entered",)
 """Events that reveal whether the tip is in the target."""
@@ -256,10 +226,6 @@ class ViewSettings(Settings):
     language: Literal["en", "de", "pl"] = "en"
     """Language of the text in the view."""
 
-    font: StudyPath | None = None
-    """Font file for the text, in the protocol's folder; DejaVu Sans by default, whose digits are as
-    high as capitals."""
-
     text_arcmin: Annotated[PositiveFloat | None, Usual(5.0, 180.0)] = None
     """Height of capitals and digits as a visual angle, in minutes of arc (ISO 9241-303 requires at
     least 16, and recommends 20 to 22); a fixed share of the window's height by default."""
@@ -317,13 +283,6 @@ class ViewSettings(Settings):
     renderer: Literal["auto", "software"] = "auto"
     """``software`` draws without a graphics driver, and without shadows."""
 
-    @field_validator("font")
-    @classmethod
-    def _is_a_font(cls, font: Path | None, info: ValidationInfo) -> Path | None:
-        if font is not None and font.suffix.lower() not in FONTS and not was_run(info):
-            raise ValueError(f"{font.name!r} is not a font file; give one, as .ttf or .otf")
-        return font
-
     @model_validator(mode="after")
     def _screens_and_text_fit(self) -> "ViewSettings":
         if self.screens and self.screen is not None:
@@ -366,14 +325,6 @@ class ViewSettings(Settings):
             "key of that view": self.keys,
             "audience": [self.seen_by],
         }
-
-    def needs(self, machine: Machine) -> Names:
-        if self.font is not None and _is_file(self.font) and (why := _no_font(self.font)):
-            raise ProtocolError(
-                f"font is {self.font.name!r}, which {why}; give a TrueType or OpenType font",
-                at=("font",),
-            )
-        return {}
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
         names = [camera.name for camera in self.cameras]

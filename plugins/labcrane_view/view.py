@@ -133,7 +133,7 @@ class View(Feedback):
             target = self._turned_over(output)
         target.set_clear_color(core.LColor(*back, 1.0))
         self._pictures = [output] if target is output else [output, target]
-        pieces, letters = window.span.pieces, font(settings.font)
+        pieces, letters = window.span.pieces, font()
         self._letters = letters
         self._line_px = _line(settings, letters)
         overlay = Overlay(target, self._size, 20, pieces, self._line_px)
@@ -251,7 +251,7 @@ class View(Feedback):
             "flip": self._settings.flip,
             **({} if self._px_per_m is None else {"px_per_m": self._px_per_m}),
             **({} if self._settings.viewing_m is None else {"viewing_m": self._settings.viewing_m}),
-            "font": font_name(self._settings.font, self._letters),
+            "font": font_name(self._letters),
             "delay": "not measured",
         }
 

@@ -347,7 +347,7 @@ class Wrong:
 
 
 FREE = {"title", "name", "text", "left", "right", "pattern", "language", "type", "source_id",
-        "rights", "study", "host", "font", "stick", "bus", "colour"}  # fmt: skip
+        "rights", "study", "host", "stick", "bus", "colour"}  # fmt: skip
 """Keys whose text is a person's own, or may be spelt in more than one way."""
 
 OF_LAB = {

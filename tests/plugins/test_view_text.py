@@ -2,9 +2,7 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
-import matplotlib
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -81,12 +79,6 @@ def test_the_size_of_text_needs_the_screens_and_the_eyes_distance() -> None:
         a_view(renderer="software", text_arcmin=22, viewing_m=0.7),
     ):
         pass
-
-
-def test_a_font_of_the_study_is_read_and_named() -> None:
-    own = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "STIXGeneral.ttf"
-    with a_view(font=own, hud=("trial",), renderer="software") as view:
-        assert view.metadata()["font"] == "STIXGeneral"
 
 
 def test_the_record_names_the_font() -> None:

@@ -181,7 +181,7 @@ def test_digits_are_as_high_as_capitals_and_stand_on_the_line(digits: str) -> No
 
     def extent(text: str) -> tuple[float, float]:
         node = core.TextNode("digits")
-        node.set_font(font(None))
+        node.set_font(font())
         node.set_text(text)
         low, high = core.NodePath(node.generate()).get_tight_bounds()
         return low[2], high[2]

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-import matplotlib
 import pytest
 from rehearsal import SHORT, said_of
 
@@ -60,7 +59,6 @@ def told(tmp_path: Path, registry: Registry):
         ("aiming", "machine: ch8", "machine: {urdf: arm.urdf, joints: [a, b, c], tip: t}", "10:17: machine file"),
         ("retrieval", "button: float.base", "button: float.bas", "12:57: operator.button is 'float.bas', and there is no such button; did you mean 'float.base'?"),
         ("aiming", "camera: cab}", "camera: top, beside: [cap]}", "27:47: views.operator.beside[1]: there is no such camera as 'cap'; did you mean 'cab'? there is cab, cab_left, cab_right, free, top"),
-        ("aiming", "camera: cab", "font: arial.ttf", "27:31: views.operator.font is 'arial.ttf', and there is no such file;"),
         ("aiming", "camera: cab", "keys: [a, lft]", "27:35: views.operator.keys[2] is 'lft', and there is no such key; did you mean 'lshift'?"),
         ("aiming", "input: {use: dual_joystick}", "input: {use: keyboard, view: operator, axes: {slew: [a, d]}}", "11:54: input.axes.slew[1] is 'a', and there is no such key of that view; it has none"),
         ("retrieval", "look: [0.8, ", "look: [true, ", "38:56: views.operator.camera.look[1]: true is not a number; write one"),
@@ -193,7 +191,6 @@ OWN = (
     [
         ("use: sphere", "use: sphere, colour: [40, 190, 255]", "feedback.ball.colour[1] is 40; it must be less than or equal to 1"),
         ("camera: cab}", "camera: {eye: [1, 2, 3], look: [1, 2, 3]}}", "look and eye are the same point; write another"),
-        ("camera: cab}", "font: protocol.yaml}", "views.operator.font: 'protocol.yaml' is not a font file;"),
         ("camera: cab}", "patch: {on: []}}", "views.operator.patch.on is []; it needs at least 1"),
         ("camera: cab}", "patch: {on: [trial.end, trial.end]}}", "views.operator.patch.on has 'trial.end' twice; write it once"),
         ("camera: cab}", "areas: [tip, tip]}", "views.operator.areas has 'tip' twice; write it once"),
@@ -485,9 +482,6 @@ FOLDER, EMPTY, NOISE = None, b"", b"\x00\x01noise\xff"
 @pytest.mark.parametrize(
     ("old", "new", "name", "said"),
     [
-        ("camera: cab", "font: a.ttf", "a.ttf", "27:31: "),
-        ("machine: ch8 ", "page: {logo: a.png}\nmachine: ch8 ", "a.png", "10:14: "),
-        ("machine: ch8 ", "page: {logo: a.svg}\nmachine: ch8 ", "a.svg", "10:14: "),
         ("design:", "questionnaires: {a: {use: free, file: q.yaml}}\ndesign:", "q.yaml", "30:39: "),
     ],
 )  # fmt: skip
@@ -501,23 +495,9 @@ def test_a_file_that_a_run_would_open_is_looked_into(
     (line,) = told("aiming", AIMING.replace(old, new))
     assert line.startswith(said), line
     assert re.search(
-        "which is a folder; name|is not a font; give|export the picture|cannot be read|holds no keys; it must",
+        "which is a folder; name|cannot be read|holds no keys; it must",
         line,
     ), line
-
-
-def test_a_font_that_is_cut_off_is_refused_and_a_whole_one_is_not(told, tmp_path: Path) -> None:
-    told("aiming", AIMING)
-    raw = (Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "STIXGeneral.ttf").read_bytes()
-    text = AIMING.replace("camera: cab", "font: a.ttf")
-    for part in (4, 100, len(raw) // 2, len(raw) - 100):
-        (tmp_path / "aiming" / "a.ttf").write_bytes(raw[:part])
-        (line,) = told("aiming", text)
-        assert line == (
-            "27:31: font is 'a.ttf', which is cut off; give a TrueType or OpenType font"
-        )
-    (tmp_path / "aiming" / "a.ttf").write_bytes(raw)
-    assert told("aiming", text) == []
 
 
 def test_instructions_that_are_a_folder_are_told_so(told) -> None:

@@ -177,32 +177,12 @@ def _output(
     return (output, span) if output.is_valid() else None
 
 
-def font(path: Path | None) -> Any:
-    """Return the font in a file, or a plain one.
-
-    Raises
-    ------
-    DeviceError
-        There is no such font.
-    """
-    if path is None:
-        return _plain_font()
-    if not path.is_file():
-        raise DeviceError(f"there is no font file {str(path)!r}; correct font: or leave it out")
-    loaded = core.FontPool.load_font(core.Filename.from_os_specific(str(path)).get_fullpath())
-    if loaded is None or not loaded.is_valid():
-        raise DeviceError(f"{str(path)!r} cannot be read as a font; TrueType and OpenType can")
-    return loaded
-
-
-def font_name(path: Path | None, loaded: Any) -> str:
+def font_name(loaded: Any) -> str:
     """Return what the record calls a font."""
-    if path is not None:
-        return path.stem
     return "Panda3D's own" if loaded == core.TextNode.get_default_font() else "DejaVu Sans"
 
 
-def _plain_font() -> Any:
+def font() -> Any:
     """Return a font whose digits are all as high as capitals, with the letters of our languages.
 
     The renderer's own has old-style digits, in which 0.00 reads as three small letters. Matplotlib,
