@@ -1,7 +1,7 @@
 """Control panels on a CAN bus: J1939 auxiliary valve commands, or whatever a DBC file describes."""
 
 from labcrane import InputDevice, Offer, hookimpl, offer
-from labcrane.registry import LAB, CommandOffer
+from labcrane.registry import LAB
 from labcrane_can.settings import CanSettings
 
 labcrane_api = 1
@@ -12,10 +12,3 @@ def labcrane_inputs() -> list[Offer[InputDevice]]:
     panel, examine = "labcrane_can.panel:CanPanel", "labcrane_can.examination:examine"
     needs = {"can": LAB, "cantools": LAB}
     return [offer("can", CanSettings, panel, examine, needs=needs)]
-
-
-@hookimpl
-def labcrane_commands() -> list[CommandOffer]:
-    from labcrane_can import commands
-
-    return [CommandOffer(("gateway", "can"), commands.can)]

@@ -14,6 +14,9 @@ PRIORITY = 3
 FULL = 250
 LENGTH = 8
 NOT_AVAILABLE, ERROR = 0xFF, 0xFE
+OWN_NODE = 0x80
+"""Source address of the messages that labcrane sends; a valve's is 0x80 plus its number."""
+
 FLOW_OFFSET = 125
 """Offset that is added to a flow in percent when it is sent back."""
 
@@ -101,7 +104,7 @@ def encode(
     return _identifier(COMMAND + valve, node, priority), data
 
 
-def encode_flow(kind: int, valve: int, percent: float, node: int) -> tuple[int, bytes]:
+def encode_flow(kind: int, valve: int, percent: float, node: int = OWN_NODE) -> tuple[int, bytes]:
     """Return identifier and data of an estimated or measured flow in percent, with its sign."""
     whole = max(-FLOW_OFFSET, min(FLOW_OFFSET, round(percent)))
     extend, retract = max(whole, 0), max(-whole, 0)

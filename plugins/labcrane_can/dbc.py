@@ -37,27 +37,6 @@ class DescribedMessage:
 GARBLED = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, RecursionError)
 
 
-def signal_names(path: Path) -> dict[str, str]:
-    """Return every signal of a DBC file by its name in lower case, as ``Message.Signal``.
-
-    Raises
-    ------
-    ProtocolError
-        The file cannot be read, or two signals have the same name.
-    """
-    found: dict[str, str] = {}
-    for message in _messages(path):
-        for signal in message.signals:
-            full, name = f"{message.name}.{signal.name}", signal.name.lower()
-            if name in found:
-                raise ProtocolError(
-                    f"{path} has two signals {name!r}, {found[name]} and {full}; say which moves "
-                    f"the joint: --valve {name}={full}"
-                )
-            found[name] = full
-    return found
-
-
 def every_signal(path: Path) -> tuple[str, ...]:
     """Return every signal of a DBC file as ``Message.Signal``.
 

@@ -74,8 +74,7 @@ class CanPanel(InputDevice):
             valve = self._settings.valves[joint]
             if not isinstance(valve, int):
                 return  # a DBC map does not describe the messages that the panel expects
-            node = self._settings.own_node
             estimated = PERCENT * openings[place] / FULL
             measured = PERCENT * speeds[place] / self._machine.speeds[place]
-            listener.send(*encode_flow(ESTIMATED, valve, estimated, node))
-            listener.send(*encode_flow(MEASURED, valve, measured, node))
+            listener.send(*encode_flow(ESTIMATED, valve, estimated))
+            listener.send(*encode_flow(MEASURED, valve, measured))

@@ -171,9 +171,6 @@ class CanSettings(ValveMap):
     feedback: bool = True
     """Whether estimated and measured flow are sent back to the panel, ten times a second."""
 
-    own_node: Node = 0x80
-    """Source address of the messages that labcrane sends; a valve's is 0x80 plus its number."""
-
     @field_validator("bus")
     @classmethod
     def _can_be_looked_for(cls, bus: str, info: ValidationInfo) -> str:

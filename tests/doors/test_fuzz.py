@@ -33,7 +33,7 @@ from labcrane.session.questionnaire import QuestionnaireForm
 from labcrane.testing import Command, Order, Study, ch8
 from labcrane_bids.dataset import people_table
 from labcrane_can.command_state import PanelCommands
-from labcrane_can.dbc import signal_names
+from labcrane_can.dbc import every_signal
 from labcrane_can.settings import ValveMap
 from labcrane_dmd.fit.recordings import read_recordings
 from labcrane_gateway.settings import GatewaySettings
@@ -197,7 +197,7 @@ DOORS = {
     "header": (headers, 1500, (b"<!DOCTYPE a>", b"<desc>", b"</info>", b"&#0;", b"&lt;", b"inf")),
     "samples": (file("foreign.xdf", read_xdf), 800, (b"\x08", b"\x04", b"\x03\x00")),
     "yaml": (yaml, 500, (b"&a ", b"*a", b"<<: ", b"!!python/name:os", b"- - - ", b"? ", b"|\n")),
-    "dbc": (file("panel.dbc", signal_names), 150, (b"SG_", b"BO_ ", b"@1-", b"m0", b"M")),
+    "dbc": (file("panel.dbc", every_signal), 150, (b"SG_", b"BO_ ", b"@1-", b"m0", b"M")),
     "people": (file("people.csv", people_table), 800, (b"\x1f\x8b", b"\t", b";", b'""')),
     "stl": (file("a.stl", read_surface), 300, (b"vertex", b"endfacet", b"solid", b"inf")),
     "obj": (file("a.obj", read_surface), 400, (b"\nf ", b"\nv ", b"/", b"\\\n", b"-1", b"inf")),

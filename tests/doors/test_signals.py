@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from labcrane import ProtocolError
 from labcrane.testing import ch8
 from labcrane_can.command_state import PanelCommands
-from labcrane_can.dbc import signal_names
+from labcrane_can.dbc import every_signal
 from labcrane_can.listener import Listener
 from labcrane_can.settings import CanSettings, ValveMap
 from labcrane_gateway.settings import GatewaySettings
@@ -113,12 +113,12 @@ def test_a_damaged_dbc_file_is_refused_in_words(tmp_path: Path) -> None:
             text[dice.randrange(len(text))] = dice.randrange(256)
         path.write_bytes(text)
         try:
-            signal_names(path)
+            every_signal(path)
         except ProtocolError as error:
             assert str(path) in str(error)  # noqa: PT017 - most damage is harmless
     path.write_bytes(b" " * 1_000_001)
     with pytest.raises(ProtocolError, match="it has 1000001 bytes; the most are 1000000"):
-        signal_names(path)
+        every_signal(path)
 
 
 class Newest:

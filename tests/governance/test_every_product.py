@@ -216,7 +216,7 @@ IN_THE_DATA_FOLDER = {
 OF_NOBODY = {
     "demo", "simulate", "doctor", "approve", "amend", "methods",
     "report-problem", "schema", "start", "new-study", "new-plugin", "streams", "record",
-    "gateway can", "dmd fit", "dmd plot", "dmd validate",
+    "dmd fit", "dmd plot", "dmd validate",
 }  # fmt: skip
 """They write of simulated operators, a computer, a machine or a protocol, and no pseudonym."""
 

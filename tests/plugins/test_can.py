@@ -11,8 +11,7 @@ from faults.sessions import wait_for
 from slcan_adapter import SlcanAdapter
 
 from labcrane import InputDevice, Tick
-from labcrane.testing import CommandContract, InputContract, ch8, make_frame, make_run
-from labcrane_can import labcrane_commands
+from labcrane.testing import InputContract, ch8, make_frame, make_run
 from labcrane_can.avc import ESTIMATED, FULL, FrameError, State, decode, encode, encode_flow
 from labcrane_can.command_state import PanelCommands
 from labcrane_can.panel import CanPanel
@@ -36,6 +35,8 @@ class TestCanPanel(InputContract):  # "can"
 @pytest.mark.parametrize(
     ("bus", "said"),
     [
+        ("can0", "'can0' is not a bus; write interface:channel, as slcan:/dev/ttyACM0"),
+        ("socketcand:can0@host:abc", "'abc' is not a port; write socketcand:channel@host:port"),
         ("slcam:/dev/ttyACM0", "python-can has no interface 'slcam'; did you mean 'slcan'? it has"),
         ("tty:/dev/ttyACM0", "python-can has no interface 'tty'; it has canalystii,"),
         (
@@ -53,12 +54,6 @@ def test_a_bus_that_python_can_does_not_know_is_refused(bus: str, said: str) -> 
 @pytest.mark.parametrize("interface", sorted(can.VALID_INTERFACES))
 def test_every_bus_of_python_can_can_be_named(interface: str) -> None:
     assert CanSettings(bus=f"{interface}:can0", valves=VALVES).bus.startswith(interface)
-
-
-class TestCommands(CommandContract):
-    @pytest.fixture(params=labcrane_commands(), ids=lambda offered: " ".join(offered.words))
-    def command(self, request):
-        return request.param
 
 
 def test_every_signal_survives_the_bus_with_its_sign_from_the_state() -> None:

@@ -10,7 +10,6 @@ from rehearsal import loaded
 from wrong_protocols import PROTOCOLS
 
 from labcrane import ProtocolError
-from labcrane.__main__ import main
 from labcrane.testing import ch8
 from labcrane_can.command_state import PanelCommands
 from labcrane_can.settings import ValveMap
@@ -225,46 +224,6 @@ def test_a_j1939_panel_has_any_source_and_priority(tmp_path: Path) -> None:
     assert not commands.signals(0.0)[2]
     commands.take(can.Message(arbitration_id=0x0CFDD627, data=data), 0.0)
     assert commands.signals(0.0)[2]
-
-
-BRIDGE = ("gateway", "can", "--bus", "virtual:by-name", "--seconds", "0.01")
-
-
-def test_a_dbc_file_alone_maps_its_signals_by_their_names(panel: Path, capsys) -> None:
-    assert main([*BRIDGE, "--map", str(panel)]) == 0
-    assert "LSL stream 'gateway.command': boom, arm; Ctrl-C ends" in capsys.readouterr().out
-
-
-def test_two_signals_of_one_name_and_no_map_at_all_are_refused(panel: Path, capsys) -> None:
-    twice = LEVERS[LEVERS.index("BO_ 256") :].replace("BO_ 256 Levers", "BO_ 257 Others")
-    panel.write_text(LEVERS + "\n" + twice, encoding="utf-8")
-    assert main([*BRIDGE, "--map", str(panel)]) == 2
-    assert "has two signals 'boom', Levers.Boom and Others.Boom; say which moves the joint" in (
-        capsys.readouterr().err
-    )
-    assert main([*BRIDGE]) == 2
-    assert "say which valve moves which joint" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--bus", "can0"], "bus: 'can0' is not a bus; write interface:channel, as slcan:/dev"),
-        (
-            ["--bus", "socketcand:can0@host:abc"],
-            "bus: 'abc' is not a port; write socketcand:channel@host:port, or omit the port",
-        ),
-        (["--valve", "boom=Levers.Boom"], "which only a DBC file explains; give map, or the"),
-        (["--valve", "boom=16"], "valves.boom"),
-    ],
-)
-def test_options_that_cannot_be_are_refused_in_words(
-    options: list[str], words: str, capsys
-) -> None:
-    assert main([*BRIDGE, "--valve", "arm=2", *options]) == 2
-    said = " ".join(capsys.readouterr().err.split())
-    assert words in said
-    assert "Traceback" not in said
 
 
 @pytest.mark.parametrize("seed", range(4))
