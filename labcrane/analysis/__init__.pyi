@@ -23,7 +23,6 @@ from .movements import Movement, movements_of
 from .presented import PRESENTED, presentation_failed
 from .questionnaires import answers_of, asked_in, beside_trials, scores_of
 from .tables.annotations import annotations_of
-from .tables.dataset import Dataset, open_dataset
 from .tables.films import films_of
 from .tables.responses import measures_by, responses, responses_of
 
@@ -31,7 +30,6 @@ __all__ = [
     "EEG_READERS",
     "GAP",
     "PRESENTED",
-    "Dataset",
     "Exporter",
     "Glass",
     "Movement",
@@ -57,7 +55,6 @@ __all__ = [
     "measures_of",
     "monitor_setting",
     "movements_of",
-    "open_dataset",
     "presentation_failed",
     "responses",
     "responses_of",

@@ -1,69 +1,15 @@
-"""One Arrow dataset over all participants, and measures that are made once and never stale."""
+"""Measures that are made once and never stale."""
 
 import shutil
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.compute as pc
-import pyarrow.dataset as ds
 import pytest
 
-from labcrane import RecordingError
-from labcrane.analysis import Dataset, Participant, measures_of
+from labcrane.analysis import Participant, measures_of
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.measures import DEFAULTS, MeasureSettings, measure_session
 from labcrane.analysis.tables import measure_cache
-
-
-@pytest.fixture(scope="module")
-def dataset(cohort: Cohort) -> Dataset:
-    return Dataset(cohort.included)
-
-
-@pytest.mark.slow
-def test_a_trial_is_cut_out_of_the_frames_that_say_they_are_of_it(
-    dataset: Dataset, cohort: Cohort
-) -> None:
-    person = cohort.included[1]
-    (number, session), *_ = person.sessions()
-    loop, state = session.streams["loop"].data, session.streams["state"]
-    for trial in np.random.default_rng().choice(loop["trial"][loop["trial"] > 0].unique(), 2):
-        inside = (loop["trial"] == trial).to_numpy()
-        table = pa.table(dataset[person.name, number, int(trial)])
-        assert set(table["participant"].to_pylist()) == {person.name}
-        assert set(table["trial"].to_pylist()) == {int(trial)}
-        np.testing.assert_array_equal(table["time"], state.time[inside])
-        np.testing.assert_array_equal(
-            table["state.tip.position.x"], state.data["tip.position.x"][inside]
-        )
-
-
-def test_arrow_filters_everybody_at_once(dataset: Dataset, cohort: Cohort) -> None:
-    chosen = dataset[:, 1].select("state.tip.position.z")
-    scanner = ds.Scanner.from_batches(
-        chosen.reader(), filter=pc.field("trial") == 2, columns=["participant", "trial"]
-    )
-    counts = {
-        person.name: int((session.streams["loop"].data["trial"] == 2).sum())
-        for person in cohort.included
-        for _, session in person.sessions()
-    }
-    assert scanner.to_table().to_pandas()["participant"].value_counts().to_dict() == counts
-
-
-def test_what_is_not_there_is_said_with_what_is(dataset: Dataset) -> None:
-    with pytest.raises(RecordingError, match=r"no participant 'P009'; it has P001, P002"):
-        dataset["P009"]
-    with pytest.raises(RecordingError, match="no selected participant has session 7"):
-        dataset["P001", 7]
-    with pytest.raises(RecordingError, match=r"no column 'boom'; it has participant, session"):
-        dataset.select("boom")
-    with pytest.raises(RecordingError, match=r"slice.* selects a range; give one name or number"):
-        dataset["P001", 1, 1:3]
-    with pytest.raises(RecordingError, match=r"'1' is not the number of a session or trial"):
-        dataset["P001", "1"]
 
 
 @pytest.fixture
