@@ -12,7 +12,6 @@ from panda3d import core
 from labcrane import FloatArray, Frame, Machine, ProtocolError
 from labcrane_view.areas import Projection, axes_of
 from labcrane_view.framing import framed
-from labcrane_view.scene import cab
 from labcrane_view.scene.backdrop import Backdrop
 from labcrane_view.scene.stage import SCENERY, Stage
 from labcrane_view.screen.placement import Piece
@@ -131,8 +130,7 @@ class Camera:
         if self.settings.look == "targets":
             width, height = part.picture
             place = np.array(self.settings.eye)
-            clear = cab.CLEAR if self.settings.cab_frame else 1.0
-            look, self._fov_deg = framed(self.settings.name, place, must_see, width / height, clear)
+            look, self._fov_deg = framed(self.settings.name, place, must_see, width / height)
             self._look = look.tolist()
         self._node = self._stage.root.attach_new_node(self.settings.name)
         picture = None
@@ -154,10 +152,6 @@ class Camera:
                 eye.set_camera_mask(mask)
             elif mask is not None:
                 eye.set_camera_mask(mask | SCENERY)
-            if mask is not None and self.settings.cab_frame:
-                half = math.tan(math.radians(self._fov_deg) / 2.0)
-                width, height = part.picture
-                stage.add_cab(self._node, cab.window(half, half * height / width), mask)
             region = _region(target, piece, left)
             region.set_clear_color_active(True)
             region.set_clear_color(core.LColor(*ground, 1.0))

@@ -35,7 +35,7 @@ def must_be_seen(run: Run) -> FloatArray:
 
 
 def framed(
-    name: str, eye: FloatArray, points: FloatArray, aspect: float, clear: float = 1.0
+    name: str, eye: FloatArray, points: FloatArray, aspect: float
 ) -> tuple[FloatArray, float]:
     """Return where a camera at ``eye`` looks, and its horizontal field of view in degrees.
 
@@ -45,8 +45,6 @@ def framed(
         What it must hold, in metres, shape ``(n, 3)``.
     aspect
         Width of the picture by its height.
-    clear
-        Share of the picture, about its middle, that must hold them.
 
     Raises
     ------
@@ -68,7 +66,7 @@ def framed(
             half = math.inf
             break
         across, up = seen[:, 0] / seen[:, 1], seen[:, 2] / seen[:, 1]
-        half = MARGIN / clear * max(np.abs(across).max(), aspect * np.abs(up).max())
+        half = MARGIN * max(np.abs(across).max(), aspect * np.abs(up).max())
         aside, above = (across.min() + across.max()) / 2, (up.min() + up.max()) / 2
         forward = axes[1] + aside * axes[0] + above * axes[2]
         forward /= np.linalg.norm(forward)

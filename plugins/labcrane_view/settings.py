@@ -29,7 +29,6 @@ from labcrane.core import (
     WrongKey,
     was_run,
 )
-from labcrane_view.scene.daylight import Time
 
 Triple = tuple[float, float, float]
 
@@ -60,10 +59,6 @@ class CameraSettings(Settings):
 
     depth_m: tuple[PositiveFloat, PositiveFloat] = (0.5, 20.0)
     """Near and far end of a depth picture, in metres along the line of sight."""
-
-    cab_frame: bool = False
-    """Whether the camera looks out of a cab: pillars, the edge of the roof and a sill hide what is
-    behind them, and keep their place in the picture. They do not crop areas of interest."""
 
     rate_hz: Annotated[PositiveFloat | None, Usual(1.0, 500.0)] = None
     """Pictures per second of the session's time; as many as the window shows by default."""
@@ -240,10 +235,6 @@ class ViewSettings(Settings):
     """Cues for the height of the tip and its place above the ground: a spot below it, a line down
     to the ground, a grid of lines on the ground, one metre apart. Every group sees them, because a
     view has the same settings in all groups."""
-
-    daylight: Time = "day"
-    """``day``, ``evening`` with a low sun and long shadows, ``overcast`` with faint shadows, or
-    ``dusk``. Contrast and haze follow the time of day."""
 
     delay_s: Annotated[NonNegativeFloat, Usual(0.001, 5.0)] = 0.0
     """Delay of the picture, in seconds, as in teleoperation."""

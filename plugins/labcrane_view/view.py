@@ -22,7 +22,7 @@ from labcrane_view.hud import WORDS, Hud, notice, standing
 from labcrane_view.keys import Keys
 from labcrane_view.overlay import Overlay, capital
 from labcrane_view.quality import LEVELS, Level, chosen, picture_s
-from labcrane_view.scene.daylight import DAYLIGHT
+from labcrane_view.scene.daylight import DAY
 from labcrane_view.scene.stage import Stage
 from labcrane_view.screen.placement import PictureSpan, Piece, WindowPlacer, monitor_of, per_metre
 from labcrane_view.screen.refresh import Refresh, refresh_of
@@ -117,9 +117,8 @@ class View(Feedback):
         self._size = (output.get_x_size(), output.get_y_size())
         scenery = settings.content == "scene"
         shadow = quality.shadow if settings.shadow is None else settings.shadow
-        daylight = DAYLIGHT[settings.daylight]
         self.stage = Stage(
-            run, daylight, shaders=window.shaders, shadow=shadow, scenery=scenery, soft=quality.soft
+            run, DAY, shaders=window.shaders, shadow=shadow, scenery=scenery, soft=quality.soft
         )
         if "ground_grid" in settings.depth_cues:
             self.stage.grid()
@@ -127,7 +126,7 @@ class View(Feedback):
             self.stage.root.set_antialias(core.AntialiasAttrib.M_multisample)
         self._hud = Hud(settings.hud_lines, settings.language, run)
         self._areas = Areas(settings.areas, run, self._size, settings.flip)
-        back = daylight.haze if scenery else (0.0, 0.0, 0.0)
+        back = DAY.haze if scenery else (0.0, 0.0, 0.0)
         target: Any = output
         if settings.flip != "none":
             target = self._turned_over(output)

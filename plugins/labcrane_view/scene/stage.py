@@ -39,7 +39,6 @@ LAST = (0.90, 0.66, 0.07, 1.0)
 STEEL = (0.42, 0.44, 0.46, 1.0)
 BARREL = (0.22, 0.23, 0.25, 1.0)
 CHROME = (0.72, 0.74, 0.77, 1.0)
-CAB = (0.10, 0.105, 0.11, 1.0)
 RUBBER = (0.05, 0.05, 0.055, 1.0)
 
 GRID = (0.78, 0.80, 0.80, 1.0)
@@ -191,10 +190,6 @@ class Stage:
         """Add what shows the scenery to a camera."""
         sheet.set_shader(self._backdrop)
         sheet.hide(~mask)
-
-    def add_cab(self, camera: Any, mesh: Mesh, mask: Any) -> None:
-        """Add a cab that moves with a camera, which alone sees it; it casts no shadow."""
-        self._add(camera, "cab", mesh, CAB, 0.0).hide(~mask)
 
     def see_depth(self, eye: Any, near: float, far: float) -> None:
         """Make a camera see how far away what is solid is, from ``near`` to ``far`` metres."""
