@@ -314,3 +314,24 @@ def test_events_of_a_clock_that_ticks_are_within_what_is_stated(tick_s: float, c
         trips = 2e-4 + draw.exponential(5e-5, len(asked))
         found = correct(stamps, probes=np.column_stack([asked + ahead, offset, trips]), rate_hz=0.0)
         assert np.mean(np.abs(found.time - true) <= found.error) >= 0.95
+
+
+@pytest.mark.parametrize("rate", [20.0, 25.0, 30.0, 50.0, 75.0, 100.0, 250.0])
+@pytest.mark.parametrize("tick_s", [1 / 64, 0.0156001])
+def test_samples_stamped_by_windows_timer_in_milliseconds_are_within_what_is_stated(
+    tick_s: float, rate: float
+) -> None:
+    for seed in range(4):
+        draw = np.random.default_rng([seed, 9])
+        true = 1.0 + np.arange(180 * int(rate)) / rate * (1.0 + draw.uniform(-4e-5, 4e-5))
+        ahead = draw.uniform(0.0, 5000.0)
+        told = true + 1e-3 + draw.exponential(3e-4, len(true)) + ahead
+        stamps = np.floor(np.floor(told / tick_s) * tick_s / 1e-3 + 1e-6) * 1e-3
+        asked = np.arange(0.5, 183.0, 2.0)
+        offset = -ahead + draw.uniform(-3e-5, 3e-5, len(asked))
+        trips = 2e-4 + draw.exponential(5e-5, len(asked))
+        probes = np.column_stack([asked + ahead, offset, trips])
+        came = np.maximum.accumulate(true + 3e-3 + draw.exponential(1e-3, len(true)))
+        arrivals = came if seed % 2 else None
+        found = correct(stamps, probes=probes, rate_hz=rate, arrivals=arrivals)
+        assert np.mean(np.abs(found.time - true) <= found.error) >= 0.95

@@ -9,7 +9,8 @@ import numpy as np
 from labcrane.types import FloatArray
 
 MILLISECOND = 1e-3
-USUAL_S = (1.0, 0.1, 1.0 / 60.0, 1.0 / 64.0, 0.01, MILLISECOND)
+WINDOWS_S = 1.0 / 64.0
+USUAL_S = (1.0, 0.1, 1.0 / 60.0, WINDOWS_S, 0.01, MILLISECOND)
 """What programs, screens, Windows and Linux count time in: few stamps show it."""
 
 LEAST_S, MOST_S = 5e-5, 0.04
@@ -77,13 +78,15 @@ def tick(stamps: FloatArray, unit: float, period: float) -> float:
     period
         Of a regular stream; 0 of others.
     """
-    longer = _common(_steps(stamps, unit / 2.0), 1.01 * unit)
-    if not SEVERAL * unit < longer <= MOST_S:
-        return unit
-    longer = _refined(stamps, longer, 1.05 * unit / longer)
-    parts = period / longer if longer else 0.0
-    by_sampler = period > 0.0 and abs(parts - max(round(parts), 1)) < NEARLY * max(parts, 1.0)
-    return unit if not longer or by_sampler else longer
+    for longer in (_common(_steps(stamps, unit / 2.0), 1.01 * unit), WINDOWS_S):
+        if not SEVERAL * unit < longer <= MOST_S:
+            continue
+        found = _refined(stamps, longer, 1.05 * unit / longer)
+        parts = period / found if found else 0.0
+        by_sampler = period > 0.0 and abs(parts - max(round(parts), 1)) < NEARLY * max(parts, 1.0)
+        if found and not by_sampler:
+            return found
+    return unit
 
 
 def _steps(stamps: FloatArray, blur: float) -> FloatArray:
