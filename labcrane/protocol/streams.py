@@ -12,6 +12,7 @@ from pydantic import (
 )
 
 from labcrane.core.settings import Settings, Usual, WrongKey
+from labcrane.recording.own_streams import OWN_STREAMS
 from labcrane.streams.sync.report.limits import Limits, WarnLimit
 
 if TYPE_CHECKING:  # a protocol is checked without loading what corrects clocks
@@ -39,7 +40,8 @@ class StreamNeed(Settings):
     as well."""
 
     required: bool = True
-    """Whether a session starts only when the stream sends data."""
+    """Whether a session starts only when the stream sends data. It never waits for a stream that it
+    sends itself, as ``labcrane.input``."""
 
     rate_hz: Annotated[PositiveFloat | None, Usual(0.1, 50_000.0)] = None
     """Expected nominal rate, in samples per second."""
@@ -118,7 +120,7 @@ class StreamNeed(Settings):
             type=self.type,
             name=self.name,
             source_id=self.source_id,
-            required=self.required and required,
+            required=self.required and required and self.name not in OWN_STREAMS,
             rate_hz=self.rate_hz,
             channels=self.channels,
             counter=self.counter,

@@ -37,7 +37,7 @@ from labcrane.protocol.references import Parts, ReferenceChecker, twice
 from labcrane.protocol.steps import Block
 from labcrane.protocol.tracks import Track
 from labcrane.recording.data_folder import DataFolder
-from labcrane.recording.own_streams import STATED
+from labcrane.recording.own_streams import OWN_STREAMS, STATED
 from labcrane.registry.call_monitor import CallMonitor
 from labcrane.registry.registry import Registry
 
@@ -180,12 +180,6 @@ class Study:
             listed = ", ".join(f"{at} {name!r}" for at, name in enumerate(names, start=1))
             raise ProtocolError(f"there is no session {number}; {self.path} has {listed}")
 
-
-OWN_STREAMS = tuple(
-    f"labcrane.{name}"
-    for name in ("state", "input", "markers", "labels", "codes", "frame", "context")
-)
-"""Streams that every session sends (:mod:`labcrane.streams.outlets`)."""
 
 MOST_TRIALS = 100_000
 """Of a block."""

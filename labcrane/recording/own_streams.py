@@ -1,6 +1,12 @@
-"""Streams of a session's own processes: on its clock already, with the uncertainty they state."""
+"""Streams of a session's own: what it sends, and those of its processes that state their error."""
 
 from labcrane.recording.pictures import CAPTURED, TERMS
+
+OWN_STREAMS = tuple(
+    f"labcrane.{name}"
+    for name in ("state", "input", "markers", "labels", "codes", "frame", "context")
+)
+"""Streams that every session sends (:mod:`labcrane.streams.outlets`)."""
 
 ESTIMATED = "labcrane.estimate."
 """Prefix of the streams of estimates' values."""

@@ -121,7 +121,7 @@ class GazeRegionSettings(EstimateSettings):
 class StickActivitySettings(EstimateSettings):
     """How fast the sticks move, in full deflections per second, and for which share of the time.
 
-    Its stream is the session's own: ``{name: labcrane.input, required: false}``.
+    Its stream is the session's own: ``{name: labcrane.input}``.
     """
 
     values: ClassVar[tuple[str, ...]] = ("rms_speed", "moving")
@@ -149,7 +149,7 @@ class StickActivitySettings(EstimateSettings):
 class DrtResponseSettings(EstimateSettings):
     """The mean response time of a detection response task (``drt``), in seconds.
 
-    Its stream is the session's own: ``{name: labcrane.codes, required: false}``. Times are those of
+    Its stream is the session's own: ``{name: labcrane.codes}``. Times are those of
     the ticks, as in the result ``response_time`` of the task.
     """
 

@@ -27,8 +27,8 @@ tasks:
 secondary:
   drt: {{use: drt, interval_s: [0.8, 1.0], longest_s: 0.2, hit_s: [0.05, 0.6]}}
 streams:
-  sticks: {{name: labcrane.input, required: false}}
-  codes: {{name: labcrane.codes, required: false}}
+  sticks: {{name: labcrane.input}}
+  codes: {{name: labcrane.codes}}
 estimates:
   hands:
     use: stick_activity

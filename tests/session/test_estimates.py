@@ -15,6 +15,7 @@ from labcrane.analysis.quality import estimates_quality
 from labcrane.protocol import estimated, rig
 from labcrane.protocol.estimated import WORDS, State, WithEstimates
 from labcrane.protocol.questions import questions
+from labcrane.protocol.streams import StreamNeed
 from labcrane.replay import replay_session
 from labcrane.testing import Command, Order, Visit, discover, load, run
 from labcrane_estimates.settings import BandPowerSettings
@@ -190,6 +191,12 @@ def test_a_replay_reads_the_columns_and_gives_the_same_bits(tmp_path: Path, scri
     again = replay_session(path, 1, protocol=other)
     assert again.parts == ("assist.share.at_most_per_s: recorded 0.5, now 0.4",)
     assert again.difference is not None
+
+
+def test_a_session_waits_for_no_stream_that_it_sends_itself() -> None:
+    for name, waits in (("labcrane.codes", False), ("Amplifier", True)):
+        need = StreamNeed(name=name)
+        assert need.request("any", required=True).required is waits
 
 
 RULES = "stop_rules: [{estimate: load.ratio, above: 2.5}, {estimate: load.ratio, below: 2}]\n"
