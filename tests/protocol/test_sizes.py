@@ -20,6 +20,7 @@ SHARE = "is refused beyond its bounds; as small as you like is as good as 0"
 
 ANY: dict[str, str] = {
     "StopRule.above": OWN_UNIT,
+    "StopRule.below": OWN_UNIT,
     "QuestPlus.spreads": OWN_UNIT,
     "QuestPlus.until_sd": OWN_UNIT,
     "Track.at_least": OWN_UNIT,
@@ -38,6 +39,8 @@ ANY: dict[str, str] = {
     "Assist.share": SHARE,
     "ByEstimate.to": SHARE,
     "ByEstimate.between": OWN_UNIT,
+    "GazeRegionSettings.between_x": OWN_UNIT,
+    "GazeRegionSettings.between_y": OWN_UNIT,
     "QuestPlus.guess": SHARE,
     "OperatorSettings.lapse_rate": SHARE,
     "ErrorSettings.over_grip": SHARE,
