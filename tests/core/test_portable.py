@@ -53,7 +53,6 @@ TWINS = {
         "os.sched_getaffinity", "os.sched_param", "os.sched_setaffinity", "os.sched_setscheduler",
         "resource",
     ),  # MMCSS on Windows; elsewhere it is refused
-    "labcrane/processes/wake_lock.py": ("select",),  # SetThreadExecutionState on Windows
     "labcrane/recording/annotations.py": ("os.geteuid",),  # Windows' folders have no such owner
     "labcrane/recording/participant_file/verification.py": (
         "os.posix_fadvise",
