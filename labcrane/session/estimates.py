@@ -14,21 +14,27 @@ LOST, BACK = "estimate.lost", "estimate.back"
 
 
 def reporters(
-    estimates: Mapping[str, EstimateSettings], axes: Layout, log: FrameLog, console: Console
+    estimates: Mapping[str, EstimateSettings],
+    axes: Layout,
+    log: FrameLog,
+    console: Console | None,
 ) -> list[Callable[[Frame], None]]:
     """Return what reports a study's estimates in each tick; none where it has none."""
     return [EstimateReporter(estimates, axes, log, console)] if estimates else []
 
 
 class EstimateReporter:
-    """Notes each change of an estimate's state as an event, and tells the experimenter."""
+    """Notes each change of an estimate's state as an event, and reports it to a console.
+
+    There is none in a blind study: a state may be that of another participant's stream.
+    """
 
     def __init__(
         self,
         estimates: Mapping[str, EstimateSettings],
         axes: Layout,
         log: FrameLog,
-        console: Console,
+        console: Console | None,
     ) -> None:
         self._places = {name: axes.index(f"{OF_ESTIMATE}{name}.state") for name in estimates}
         self._states: dict[str, float | None] = dict.fromkeys(estimates)
@@ -44,4 +50,5 @@ class EstimateReporter:
                 about["why"] = WORDS[state]
             event = Event(BACK if state is State.OK else LOST, frame.tick.due, about)
             self._log.append(event, frame.tick.number)
-            self._console.report(event)
+            if self._console is not None:
+                self._console.report(event)
