@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from labcrane.analysis.cohort import unfinished
+from labcrane.analysis.tables.measure_cache import FOLDER
 from labcrane.design.plan import slot_by_name
 from labcrane.design.slots import group_of, slots_before
 from labcrane.errors import ProtocolError, RecordingError
@@ -301,6 +302,7 @@ def _rewrite(folder: Path, session: int, change: Rewriting, reach: Reach) -> Non
         sizes[journal.name] = journal.stat().st_size
         reach.changed.append(str(journal))
     shutil.rmtree(folder / STAGING, ignore_errors=True)
+    shutil.rmtree(folder / FOLDER, ignore_errors=True)  # measures of the file as it was
     if (path := participant_path(folder)).exists():
         with replacing(path) as beside:
             relabel_participant_file(path, beside, change, sizes)

@@ -203,6 +203,8 @@ def test_erasing_the_source_empties_its_values_wherever_they_were_copied(
     unfinished.move(lab.places, store)
     out = lab.places.exports / "tables"
     assert main(["export", str(lab.places.root), "--to", "tables", "--out", str(out)]) == 0
+    assert left_in(out, other)
+    (lab.places.raw(other) / ".measures").mkdir(exist_ok=True)
     assert str(lab.places.raw(other)) in {each.where for each in inventory(lab.places, source)}
     erased = unfinished.erase(lab.places, source, "withdrew consent", TODAY)
     assert not erased.mentions
@@ -217,6 +219,8 @@ def test_erasing_the_source_empties_its_values_wherever_they_were_copied(
     log, _ = read_journal([folder / "ses-01_run.xdf"])
     assert all(np.isnan(log.column("input", label)).all() for label in VALUES)
     assert is_recovered(folder, 1)
+    assert not (folder / ".measures").exists(), "made of the values"
+    assert left_in(out, other) == [], "to be exported again"
     with np.load(folder / "ses-01_estimates.npz") as copied:
         assert copied.files == []
     for root in (lab.places.root, store):
@@ -233,6 +237,13 @@ def test_erasing_the_source_empties_its_values_wherever_they_were_copied(
     ).to_dict("records")
     assert row["values_of"] == "erased"
     assert session(lab, own[1]).streams["input"].data[[*VALUES]].notna().any(axis=None)
+
+
+def left_in(folder: Path, name: str) -> list[str]:
+    """Return the lines of exported tables with a participant."""
+    tables = [*folder.rglob("*.csv"), *folder.rglob("*.tsv")]
+    lines = (line for table in tables for line in table.read_text("utf-8").splitlines())
+    return [line for line in lines if name in line]
 
 
 @pytest.mark.slow
