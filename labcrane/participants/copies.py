@@ -40,7 +40,7 @@ class Reach:
     changed, removed
         Files, for people.
     again
-        Results computed from all participants' data that were removed: how to make them again.
+        Results and copies with the participant's data that were removed: how to make them again.
     owed
         Copies that cannot be reached now: on a disk that is not plugged in, or an offline share.
     """
