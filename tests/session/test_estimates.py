@@ -239,12 +239,6 @@ def test_without_any_value_a_rule_is_not_met_and_the_record_says_that_it_was_not
     assert len(unjudged) == 2 * len({data["trial"] for data in unjudged}) > 0
 
 
-REFUSED = {
-    r"stop_rules\[1\].estimate is 'load.ration', .* did you mean 'load.ratio'": text("1")
-    + "stop_rules: [{estimate: load.ration, above: 2}]\n",
-    "a questionnaire and its score, or else an estimate": text("1")
-    + "stop_rules: [{estimate: load.ratio, score: total, above: 2}]\n",
-    "write above or below, one of them": text("1") + "stop_rules: [{estimate: load.ratio}]\n",
 def test_another_participant_s_values_are_aligned_trial_by_trial_and_end_with_the_record() -> None:
     due = 500.0 + np.arange(40) / 10  # 4 s; trial 1 begins after 1 s, trial 2 after 2 s
     rows = np.column_stack([np.arange(40.0), due - 0.2, np.zeros(40)])
@@ -285,6 +279,11 @@ def yoked(groups: str, design: str, share: str = "1") -> str:
 
 
 REFUSED = {
+    r"stop_rules\[1\].estimate is 'load.ration', .* did you mean 'load.ratio'": text("1")
+    + "stop_rules: [{estimate: load.ration, above: 2}]\n",
+    "a questionnaire and its score, or else an estimate": text("1")
+    + "stop_rules: [{estimate: load.ratio, score: total, above: 2}]\n",
+    "write above or below, one of them": text("1") + "stop_rules: [{estimate: load.ratio}]\n",
     "there is no group 'bb'; did you mean 'b'": yoked("[bb]", "{a: [], b: []}"),
     r"all groups are yoked \(a, b\); one must have its own": yoked("[a, b]", "{a: [], b: []}"),
     "there is no group 'b'; design has none": yoked("[b]", "{}"),
