@@ -133,7 +133,6 @@ def validate(
     Tables and figures for the other rule between layers are saved beside those of the model's own.
     """
     from labcrane_dmd.fit.figures import draw_validation
-    from labcrane_dmd.fit.printed import write_printed
     from labcrane_dmd.fit.recordings import read_recordings
     from labcrane_dmd.fit.validation import summary, write_table
     from labcrane_dmd.fit.validation import validate as compare
@@ -157,7 +156,6 @@ def validate(
         ending = "" if rule == own else f"_{rule}"
         write_table((level.row() for level in levels), folder / f"validation{ending}.csv")
         write_table(summary(levels), folder / f"summary{ending}.csv")
-        write_printed(levels, folder, ending)
         draw_validation(levels, rule, folder / f"validation{ending}.png")
         _print(levels, rule)
     if drive and machine is not None:
@@ -178,7 +176,6 @@ def _drive(
     from labcrane_dmd.fit.driven import arm_settings
     from labcrane_dmd.fit.driven import drive as measure
     from labcrane_dmd.fit.figures import draw_validation
-    from labcrane_dmd.fit.printed import write_printed
     from labcrane_dmd.fit.validation import summary, write_table
 
     operated = load_machine(machine)
@@ -189,7 +186,6 @@ def _drive(
     levels = [each.level for each in driven]
     write_table((each.row() for each in driven), folder / "driven.csv")
     write_table(summary(levels), folder / "driven_summary.csv")
-    write_printed(levels, folder, "_driven")
     rule = model.settings.between
     draw_validation(levels, f"{rule}, driven at {rate_hz:g} Hz", folder / "driven.png")
     _print(levels, f"{rule}, driven at {rate_hz:g} Hz")

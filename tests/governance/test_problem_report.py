@@ -15,14 +15,13 @@ from pathlib import Path
 import pytest
 from faults.sessions import STUDY, finished, kill_all, labcrane, wait_for
 from governance.test_commands import Terminal
-from rehearsal import ScriptedConsole, loaded
 
 from labcrane.cli.problem_report import EVENTS, places
 from labcrane.core import Event, Finding, Verdict
 from labcrane.doctor.report import Check
 from labcrane.recording.crash_marker import crash_marker_path, read_crash_marker
 from labcrane.recording.journal import Column, SessionJournal
-from labcrane.testing import Command, Order, Visit, main, run
+from labcrane.testing import main
 
 FOLDER, PERSON, HOST, USER = "Zwiebel Labor", "QX417", "hexenhaus-7", "qbertuser"
 NOTE, AMPLIFIER = "hums a tune", "amplifier-pc-3"
@@ -96,22 +95,6 @@ def report(*words: object, status: int = 0) -> Path:
     archive = Path("report.zip")
     assert main(["report-problem", "--to", str(archive), *map(str, words)]) == status
     return archive
-
-
-@pytest.mark.slow
-def test_nothing_of_people_is_in_any_byte_of_the_report_of_a_session(here: Path) -> None:
-    protocol = a_protocol(here)
-    visit = Visit(loaded(protocol), PERSON, 1, here / "data", simulated=True, fast=True)
-    run(visit, ScriptedConsole({50: [Command(Order.NOTE, f"{PERSON} {NOTE}")]}))
-    archive = report("--protocol", protocol, "--yes")
-    assert planted_in(archive) == []
-    about = json.loads(file_of(archive, "session/about.json"))
-    assert [each["damaged"] for each in about["journals"]] == [0] * len(about["journals"])
-    kept = events_of(archive)
-    assert {each["event"] for each in kept} >= {"session.start", "trial.end", "session.end"}
-    fields = {key for each in kept for key in each}
-    assert "late_ticks" in fields
-    assert not fields & {"text", "outcome", "movement_time", "value"}
 
 
 @pytest.fixture(scope="module")

@@ -314,11 +314,6 @@ def test_the_commands_leave_model_tables_and_figures(tmp_path: Path, capsys) -> 
         f"{name}{rule}.{kind}"
         for rule in ("", "_linear")
         for name, kind in (("validation", "csv"), ("validation", "png"), ("summary", "csv"))
-    } | {
-        f"table_{number}{rule}.{kind}"
-        for number in (3, 4)
-        for rule in ("", "_linear")
-        for kind in ("md", "tex")
     }
     assert (tmp_path / "arm.png").read_bytes().startswith(b"\x89PNG")
     assert main(["dmd", "validate", str(tmp_path / "no.yaml"), str(FOLDER)]) == 2
