@@ -12,7 +12,6 @@ import pylsl
 import pytest
 from cranes import needs_bullet
 from dmd_arms import with_files
-from gone_stream import goes_once
 from rehearsal import NoLog, ScriptedConsole, loaded
 
 from labcrane import FloatArray, InputDevice, Run, Tick
@@ -152,14 +151,3 @@ def test_what_is_wrong_with_a_station_is_told(labels, sample, complaint: str) ->
         axes = heard(device, run, outlet, sample, lambda: complaint in (device.fault or ""))
         assert complaint in (device.fault or "")
         assert not axes.any()
-
-
-def test_a_station_that_goes_while_it_is_found_is_found_again(monkeypatch) -> None:
-    goes_once(monkeypatch)
-    outlet = station_outlet("gone.once", ch8().names)
-    device = Station(GatewaySettings(stream="gone.once"), ch8())
-    run = make_run(ch8(), axes=device.signals)
-    device.open(run)
-    with closing(device):
-        axes = heard(device, run, outlet, [0.0, 125.0, 0.0, 0.0], lambda: device.fault is None)
-        assert axes.tolist() == [0.0, 0.5, 0.0, 0.0, 1.0]
