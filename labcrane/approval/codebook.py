@@ -118,10 +118,12 @@ def _trials(study: Study) -> list[CodebookColumn]:
         for name, settings in study.estimates.items()
         for value in settings.values
     }
+    second = {f"{name}_": study.choices[f"secondary.{name}"] for name in study.secondary}
     for task, its_choice in study.task_choices.items():
         for signal in study.tasks[task].results:
             for name in signal.columns:
-                choice = means.get(name, its_choice)
+                beside = (by for of, by in second.items() if name.startswith(of))
+                choice = means.get(name) or next(beside, its_choice)
                 source = f"{choice.plugin}: {choice.name}"
                 found[name] = CodebookColumn("trials", name, signal.unit, source, signal.definition)
     return list(found.values())

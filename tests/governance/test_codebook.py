@@ -133,7 +133,8 @@ def test_the_methods_and_the_codebook_name_each_estimate(tmp_path: Path) -> None
     assisted = "assist: {use: toward_target, share: {estimate: load.ratio, between: [1, 3], "
     assisted += "to: [0, 0.8], at_most_per_s: 0.2}}\n"
     rule = "stop_rules: [{estimate: load.ratio, above: 2.5}]\n"
-    lab = Lab(tmp_path, GROUPED.replace("tasks:", f"{estimates}{assisted}{rule}tasks:"))
+    second = "secondary: {drt: {use: drt}}\n"
+    lab = Lab(tmp_path, GROUPED.replace("tasks:", f"{estimates}{assisted}{rule}{second}tasks:"))
     lock = lab.approve()
     said = methods(lock)
     for words in (
@@ -148,6 +149,7 @@ def test_the_methods_and_the_codebook_name_each_estimate(tmp_path: Path) -> None
     sources = {row["name"]: row["source"] for row in lock.content["codebook"]}
     assert sources["estimate.load.ratio"] == "estimates: band_power"
     assert sources["load_ratio"] == "estimates: band_power", "the mean over a trial"
+    assert sources["drt_hit_rate"] == "drt: drt"
     defined = {row["name"]: row["definition"] for row in lock.content["codebook"]}
     assert defined["estimate.load.time"] == "time that the newest value stands for"
     assert defined["estimate.load.state"].startswith("state of the estimate: 0 ok, 1 warming up, ")
