@@ -33,14 +33,10 @@ def changes(
     """
     found = np.zeros(len(time))
     for run in _runs(time, parts, counted=counted):
-        start = run[0][0].start
-        shifts = [(part.start - start, one.shifted) for part, one in run if one.shifted is not None]
-        if shifts:
-            at = np.concatenate([first + one.at for first, one in shifts])
-            by_s = np.concatenate([one.by_s for _, one in shifts])
-            found[start : run[-1][0].stop] += Shifts(at, by_s).open_s(run[-1][0].stop - start)
+        whole = slice(run[0][0].start, run[-1][0].stop)
+        found[whole] = _shifts(run).open_s(whole.stop - whole.start)
         if lossless and run[0][1].unpaused is not None:
-            _add_wander(found, stamps, time, run, counted=counted)
+            found[whole] += _wander(stamps, time, run, counted=counted)
     return found
 
 
@@ -65,10 +61,19 @@ def _goes_on(time: FloatArray, before: Part, after: Part, *, counted: bool) -> b
     return abs(step - samples * other.period) < MOST_S
 
 
-def _add_wander(
-    found: FloatArray, stamps: FloatArray, time: FloatArray, run: list[Part], *, counted: bool
-) -> None:
-    """Add how the level of stamps changes on both clocks: one of them may be slewed."""
+def _shifts(run: list[Part]) -> Shifts:
+    """Return the shifts of all parts, counted from the first sample of the run."""
+    each = [(part.start, one.shifted) for part, one in run if one.shifted is not None]
+    return Shifts(
+        np.concatenate(
+            [np.empty(0, np.intp), *(start - run[0][0].start + one.at for start, one in each)]
+        ),
+        np.concatenate([np.empty(0), *(one.by_s for _, one in each)]),
+    )
+
+
+def _wander(stamps: FloatArray, time: FloatArray, run: list[Part], *, counted: bool) -> FloatArray:
+    """Return how the level of stamps changes on both clocks: one of them may be slewed."""
     index, ours, drifted = [], [], []
     paused, drift, last = 0.0, 0.0, -1.0
     for part, one in run:
@@ -84,4 +89,4 @@ def _add_wander(
     flow, count = np.concatenate(ours), np.concatenate(index)
     period = max(run, key=lambda each: each[0].stop - each[0].start)[1].period
     levels = (wander.find(each, count, period) for each in (flow, flow + np.concatenate(drifted)))
-    found[run[0][0].start : run[-1][0].stop] += np.minimum(*levels)
+    return np.asarray(np.minimum(*levels))
