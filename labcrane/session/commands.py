@@ -8,9 +8,9 @@ import queue
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Literal, Protocol
+from typing import Annotated, Literal, Protocol
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from labcrane.core.records import Event, Value
 from labcrane.errors import LabcraneError
@@ -305,7 +305,8 @@ class StreamOffered:
 Sent = Message | StreamOffered
 """What goes to a session's process: messages to the session, and what only receivers need."""
 
-MESSAGE: TypeAdapter[Sent] = TypeAdapter(Sent)
+# By its kind alone, so that nothing without one is a message: one kind has no other content.
+MESSAGE: TypeAdapter[Sent] = TypeAdapter(Annotated[Sent, Field(discriminator="kind")])
 
 
 class MessageError(LabcraneError):

@@ -9,7 +9,7 @@ import threading
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from labcrane.launcher import session_handle
@@ -51,6 +51,7 @@ def test_every_message_comes_out_of_the_pipe_as_it_went_in(message) -> None:
 
 
 @given(st.binary(max_size=300))
+@example(b"{}")
 def test_whatever_else_comes_out_of_the_pipe_is_no_message(line: bytes) -> None:
     with pytest.raises(
         MessageError, match=f"^{len(line)} bytes that are not a message to a session"
