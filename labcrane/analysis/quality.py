@@ -81,8 +81,7 @@ def estimates_quality(participant: Participant) -> "pd.DataFrame":
     """Return how late the values of estimates were used, one row per session and estimate.
 
     Latency is the time from what a value stands for to the wake-up of the first tick that used it.
-    ``fallback_share`` is the part of the ticks that used the fallback. ``values_of`` is the
-    participant to whom a yoked one was yoked, or ``erased``.
+    ``fallback_share`` is the part of the ticks that used the fallback.
     """
     import pandas as pd
 
@@ -96,8 +95,7 @@ def _estimates(session: SessionRecord) -> Iterator[dict[str, Any]]:
         own = column.removesuffix(".state")
         found = frames.columns((f"{own}.time", column))
         time, used = found[f"{own}.time"], found[column] == 0.0
-        # Without a time where the values were those of a participant who was erased.
-        first = used & np.isfinite(time) & (np.diff(time, prepend=np.nan) != 0.0)
+        first = used & (np.diff(time, prepend=np.nan) != 0.0)
         woke = session.streams["loop"].columns(("woke",))["woke"]
         latency_ms = 1e3 * (woke - time)[first]
         middle, most = np.quantile(latency_ms, [0.5, 0.99]) if first.any() else (np.nan, np.nan)
@@ -107,13 +105,7 @@ def _estimates(session: SessionRecord) -> Iterator[dict[str, Any]]:
             "latency_median_ms": float(middle),
             "latency_p99_ms": float(most),
             "fallback_share": float(1.0 - used.mean()),
-            "values_of": _yoked_to(session, own.removeprefix("estimate.")),
         }
-
-
-def _yoked_to(session: SessionRecord, estimate: str) -> str:
-    context = session.context
-    return str(context["yoked_to"]) if estimate in context.get("yoked", ()) else ""
 
 
 def loop_backs(participant: Participant) -> "pd.DataFrame":

@@ -81,21 +81,12 @@ def codebook(study: Study) -> list[CodebookColumn]:
                 name,
                 unit,
                 next((by for of, by in own.items() if name.startswith(of)), source),
-                "; ".join(filter(None, (defined[name], _yoked(study, name)))),
+                defined[name],
             )
             for name, unit in zip(layout.columns, layout.units, strict=True)
         ]
     found += [CodebookColumn("events", name, unit, CORE) for name, unit in EVENTS]
     return found + _trials(study)
-
-
-def _yoked(study: Study, column: str) -> str:
-    """Return whose value a column of an estimate has; empty for the participant's own in all."""
-    estimate = column.removeprefix(OF_ESTIMATE).partition(".")[0]
-    if not column.startswith(OF_ESTIMATE) or not study.estimates[estimate].yoked:
-        return ""
-    groups = ", ".join(study.estimates[estimate].yoked)
-    return f"in yoked groups ({groups}) as another participant's session used it"
 
 
 def _trials(study: Study) -> list[CodebookColumn]:

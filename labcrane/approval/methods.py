@@ -82,14 +82,6 @@ def _people(protocol: Mapping[str, Any]) -> list[str]:
             f"They were allocated to {len(groups)} groups ({listed}) in permuted blocks of "
             f"{len(groups)}"
         )
-    for name, estimate in protocol.get("estimates", {}).items():
-        if yoked := estimate.get("yoked"):
-            said.append(
-                f"In {_and(list(yoked))} they were yoked: instead of their own values of the "
-                f"estimate {name}, each had those that the session of another participant of the "
-                "other groups had used, trial by trial. The experimenter's pages and terminal "
-                "did not show the groups"
-            )
     return said
 
 

@@ -160,10 +160,6 @@ class EstimateSettings(Settings):
     """Age from which a value is late: how long the time that it stands for may be past, in
     seconds."""
 
-    yoked: tuple[str, ...] = ()
-    """Groups of the design whose participants get, instead of their own values, those that another
-    participant's session used."""
-
     @model_validator(mode="after")
     def _falls_back(self) -> Self:
         if set(self.fallback) != set(self.values):

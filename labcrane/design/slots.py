@@ -33,21 +33,6 @@ def place_of(groups: Sequence[str], slot: int) -> int:
     return (slot - 1) // max(1, len(groups))
 
 
-def slots_before(
-    study: str, groups: Sequence[str], yoked: Collection[str], slot: int
-) -> tuple[int, ...]:
-    """Return the slots whose sessions come before those of a slot, in a study with yoked groups.
-
-    As many as each of the ``yoked`` groups has slots up to this one, so that each finds a source of
-    its own. This is the same for all groups: only one of these slots itself comes after none.
-    """
-    group = [group_of(study, groups, each) for each in range(1, slot + len(groups) + 1)]
-    members = Counter(group[:slot])
-    own = [number for number, each in enumerate(group, start=1) if each not in yoked]
-    first = tuple(own[: max((members[each] for each in yoked), default=0)])
-    return () if slot in first else first
-
-
 def next_slot(study: str, groups: Sequence[str], taken: Collection[int]) -> int:
     """Return the slot of the next participant: a free one, of the smallest group, the first such.
 

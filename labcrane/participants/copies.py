@@ -16,7 +16,6 @@ from labcrane.participants.folders import Places
 from labcrane.participants.mentions import Mentions
 from labcrane.participants.proof import mentioned
 from labcrane.participants.register import Export, OwedRemoval, Register, read
-from labcrane.recording.data_folder import DataFolder
 
 TABLES = {".csv": ",", ".tsv": "\t"}
 """Files from which single rows can be removed, and the separators of their cells."""
@@ -40,7 +39,7 @@ class Reach:
     changed, removed
         Files, for people.
     again
-        Results and copies with the participant's data that were removed: how to make them again.
+        Results computed from all participants' data that were removed: how to make them again.
     owed
         Copies that cannot be reached now: on a disk that is not plugged in, or an offline share.
     """
@@ -411,14 +410,6 @@ def remove_from_stores(register: Register, participant: str, reach: Reach) -> No
             reach.removed.append(str(folder))
 
 
-def forget_store(register: Register, participant: str) -> None:
-    """Take a participant's files off the lists of what the stores hold."""
-    register.stores = {
-        store: {name: sha for name, sha in files.items() if name.split("/")[0] != participant}
-        for store, files in register.stores.items()
-    }
-
-
 def write_manifest(folder: Path, content: Mapping[str, Any]) -> None:
     """Describe an export in a file next to it; BIDS and Psych-DS ignore hidden folders."""
     text = json.dumps(content, indent=2, ensure_ascii=False) + "\n"
@@ -476,11 +467,6 @@ def inventory(places: Places, participant: str) -> list[InventoryEntry]:
             for name, people in sorted(export.files.items())
             if participant in people
         ]
-    found += [
-        InventoryEntry("yoked session", str(places.root / each.participant), HERE)
-        for each in register.yokes
-        if DataFolder.pseudonym(each.source) == participant
-    ]
     found += [
         InventoryEntry("merged from", each.folder, "not reached from here: erase or relabel there")
         for each in register.merges

@@ -11,7 +11,6 @@ from labcrane.participants.copies import (
     Reach,
     edit_exports,
     forget_export,
-    forget_store,
     reached_now,
     remove_from_stores,
 )
@@ -28,7 +27,6 @@ from labcrane.participants.register import (
     changed,
     read,
 )
-from labcrane.participants.yoking import check_idle, end_yokes, follow, yoked_people
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +68,6 @@ def begin(places: Places, participant: str, reason: str, today: date) -> None:
     check_words(reason, "reason")
 
     def check(register: Register) -> None:
-        check_idle(places, register, participant)
         if participant in register.participants:
             # A name that could not be given today, but was: it is one folder's all the same.
             if Path(participant).name != participant or participant.lower() in OURS:
@@ -88,7 +85,6 @@ def carry_out(places: Places, work: Work) -> Erased:
     """Erase; may be killed and repeated at any moment."""
     participant, reach = work.participant, Reach()
     register = reaching(places, participant)
-    follow(places, register, work, reach)
     reach.owed += [
         OwedRemoval(participant=participant, folder=str(link), link=True)
         for link in places.links(participant)
@@ -100,7 +96,6 @@ def carry_out(places: Places, work: Work) -> Erased:
     remove_from_stores(register, participant, reach)
     with changed(places) as now:
         now.participants.pop(participant, None)
-        end_yokes(places, now, work)
         forget_export(places, now, participant, None)
         forget_store(now, participant)
         now.owed += reach.owed
@@ -119,10 +114,17 @@ def reaching(places: Places, participant: str) -> Register:
     """
     with changed(places) as register:
         assert register.work is not None  # noqa: S101 - begun before
-        people = {participant, *yoked_people(register, participant)}
-        there = {place for each in people for place in reached_now(places, register, each)}
+        there = reached_now(places, register, participant)
         register.work.reached = sorted({*register.work.reached, *there})
     return read(places)
+
+
+def forget_store(register: Register, participant: str) -> None:
+    """Take a participant's files off the lists of what the stores hold."""
+    register.stores = {
+        store: {name: sha for name, sha in files.items() if name.split("/")[0] != participant}
+        for store, files in register.stores.items()
+    }
 
 
 def mentions(places: Places, participant: str) -> tuple[list[str], list[str]]:

@@ -17,7 +17,6 @@ from labcrane.participants.register import (
     Export,
     Merge,
     Register,
-    Yoke,
     changed,
     read,
     unregistered,
@@ -159,12 +158,9 @@ def _contradictions(
         if name in erased:
             found.append(f"{name} was erased here and not there; erase {name} there, too")
         elif (own := ours.participants.get(name)) is not None:
-            differs = [
+            if differs := [
                 key for key in Entry.model_fields if getattr(own, key) != getattr(entry, key)
-            ]
-            if _yokes(ours, name) != _yokes(theirs, name):
-                differs.append("yokes")
-            if differs:
+            ]:
                 found.append(
                     f"{name} is in both registers with different content: {', '.join(differs)}; "
                     "if these are two people, relabel one of them; if it is one, merge both "
@@ -178,10 +174,6 @@ def _contradictions(
             except ProtocolError as error:
                 found.append(str(error))
     return found
-
-
-def _yokes(register: Register, participant: str) -> list[Yoke]:
-    return [each for each in register.yokes if each.participant == participant]
 
 
 def _accepted(ours: Register, theirs: Register, known: frozenset[str] | None) -> frozenset[str]:
@@ -289,12 +281,6 @@ def _join(register: Register, theirs: Register, other: Places) -> None:
     exports = [_elsewhere(each, other) for each in theirs.exports]
     register.exports += [
         each for each in exports if (each.exporter, each.date, each.folder) not in known
-    ]
-    register.yokes += [
-        each
-        for name in theirs.participants
-        for each in _yokes(theirs, name)
-        if each not in register.yokes
     ]
     register.owed += [each for each in theirs.owed if each not in register.owed]
     register.merges += [each for each in theirs.merges if each not in register.merges]

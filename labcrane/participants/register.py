@@ -151,19 +151,6 @@ class Work(Record):
     """Folders outside of the data folder that were there when it began."""
 
 
-class Yoke(Record):
-    """Whose values of estimates a session of a yoked participant gets."""
-
-    participant: str
-    """Name of the folder: pilots and simulations are yoked, too."""
-    session: int
-    group: str
-    source: str
-    """Name of the other's folder; empty once the other was erased."""
-    values: list[str]
-    """Which, as ``load.ratio``."""
-
-
 class Merge(Record):
     """Another data folder of the study whose register was entered into this one."""
 
@@ -192,7 +179,6 @@ class Register(Record):
     merges: list[Merge] = Field(default_factory=list)
     shared_slots: list[int] = Field(default_factory=list)
     """Slots that laboratories had handed out before their registers were merged."""
-    yokes: list[Yoke] = Field(default_factory=list)
     work: Work | None = None
 
     @property

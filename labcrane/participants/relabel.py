@@ -13,12 +13,11 @@ from labcrane.participants.copies import (
     Reach,
     edit_exports,
     forget_export,
-    forget_store,
     remove_from_stores,
     store_reachable,
 )
 from labcrane.participants.enrolment import check_apart, check_words
-from labcrane.participants.erasure import reaching
+from labcrane.participants.erasure import forget_store, reaching
 from labcrane.participants.folders import Places
 from labcrane.participants.register import (
     Deviation,
@@ -30,10 +29,8 @@ from labcrane.participants.register import (
     read,
 )
 from labcrane.participants.transfer import transfer
-from labcrane.participants.yoking import check_idle, end_yokes, follow
 from labcrane.recording.annotations import is_annotations
 from labcrane.recording.participant_file.relabel import (
-    Rewriting,
     relabel_journal,
     relabel_participant_file,
     renaming,
@@ -52,7 +49,6 @@ def begin(places: Places, old: str, new: str, reason: str, today: date) -> None:
 
     def check(register: Register) -> None:
         register.entry(old)
-        check_idle(places, register, old)
         check_name(new, "participant")
         if old == new or not re.fullmatch(register.pattern, new):
             raise ProtocolError(
@@ -95,7 +91,6 @@ def carry_out(places: Places, work: Work) -> Reach:
     """Relabel; may be killed and repeated at any moment."""
     old, new, reach = work.participant, work.to, Reach()
     register = reaching(places, old)
-    follow(places, register, work, reach)
     for folder in places.all_raw(old):
         _relabel_folder(folder, _renamed(folder, old, new), old, new)
     reach.changed += [
@@ -109,7 +104,6 @@ def carry_out(places: Places, work: Work) -> Reach:
             del now.participants[old]
         forget_export(places, now, old, new)
         forget_store(now, old)
-        end_yokes(places, now, work)
         now.owed += reach.owed
     now = read(places)
     for name, files in now.stores.items():
@@ -133,11 +127,11 @@ def _relabel_folder(source: Path, target: Path, old: str, new: str) -> None:
 
 
 def _relabel_files(source: Path, target: Path, old: str, new: str) -> None:
-    rename, change = renaming(old, new), Rewriting(old, new)
+    rename = renaming(old, new)
     sizes: dict[str, int] = {}
     for path in sorted(path for path in source.glob("*.xdf") if not path.is_symlink()):
         journal = target / rename(path.name)
-        relabel_journal(path, journal, change)
+        relabel_journal(path, journal, old, new)
         sizes[journal.name] = journal.stat().st_size
     for path in sorted(source.rglob("*")):
         place = target / rename(path.relative_to(source).as_posix())
@@ -145,7 +139,7 @@ def _relabel_files(source: Path, target: Path, old: str, new: str) -> None:
             continue
         if path.suffix == ".h5":
             with replacing(place) as beside:
-                relabel_participant_file(path, beside, change, sizes)
+                relabel_participant_file(path, beside, old, new, sizes)
         elif is_annotations(path):
             write_text(place, rename(path.read_text(encoding="utf-8")))
         else:

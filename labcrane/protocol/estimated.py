@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from enum import IntEnum
-from types import MappingProxyType
 
 import numpy as np
 
@@ -22,9 +21,6 @@ from labcrane.recording.own_streams import ESTIMATED
 from labcrane.types import FloatArray
 
 MOST_A_TICK = 64
-
-ROUNDING_S = 1e-6
-"""By how much times of ticks may differ from their grid."""
 
 AHEAD_S = 0.05
 """How far ahead of now a value's time may be: by as much as a source's clock may be off."""
@@ -139,46 +135,6 @@ class Received:
         self._stream.close()
 
 
-class OthersValues:
-    """The values of one estimate that another participant's session used, trial by trial.
-
-    A trial begins where the other's trial of the same number begins. From there the time goes on,
-    also past the end of either trial.
-
-    Parameters
-    ----------
-    due
-        When the other's ticks were due, in seconds.
-    starts
-        When each trial began there, by its number.
-    rows
-        Values, time and state in these ticks.
-    oldest
-        How long the record may have no tick until there are no data, in seconds.
-    """
-
-    def __init__(
-        self, due: FloatArray, starts: Mapping[int, float], rows: FloatArray, oldest: float
-    ) -> None:
-        self._due, self._starts, self._rows, self._oldest = due, starts, rows, oldest
-        self._begins: float | None = due[0] if len(due) else None
-        self._shift = 0.0
-
-    def begin_trial(self, number: int) -> None:
-        """Begin a trial with the next tick."""
-        self._begins = self._starts.get(number, self._begins)
-
-    def fill(self, out: FloatArray, due: float) -> None:
-        """Write what was used then over the fallback, time and state in ``out``."""
-        if self._begins is not None:
-            self._shift, self._begins = due - self._begins, None
-        then = due - self._shift
-        at = int(np.searchsorted(self._due, then + ROUNDING_S, side="right")) - 1
-        if len(self._due) and then - self._due[at] <= self._oldest:
-            out[:] = self._rows[at]
-            out[-2] += self._shift
-
-
 class WithEstimates(InputDevice):
     """The operator's input device, and the estimates, which follow its axes.
 
@@ -187,19 +143,12 @@ class WithEstimates(InputDevice):
     source
         The session whose estimates are received; empty for none, as in a simulation on a clock of
         its own: each has its fallback.
-    others
-        What takes the place of values of estimates, by their names.
     """
 
     def __init__(
-        self,
-        device: InputDevice,
-        estimates: Mapping[str, EstimateSettings],
-        source: str,
-        others: Mapping[str, OthersValues] = MappingProxyType({}),
+        self, device: InputDevice, estimates: Mapping[str, EstimateSettings], source: str
     ) -> None:
         self._device, self._estimates, self._source = device, estimates, source
-        self._others = others
         own = [s for name, each in estimates.items() for s in estimate_signals(name, each)]
         self.signals = (*device.signals, *own)
         self._fallback = np.concatenate(
@@ -209,7 +158,6 @@ class WithEstimates(InputDevice):
             ]
         )
         self._received: list[tuple[slice, Received]] = []
-        self._yoked: list[tuple[slice, OthersValues]] = []
 
     @property
     def fault(self) -> str | None:  # type: ignore[override]  # the device's own
@@ -226,15 +174,11 @@ class WithEstimates(InputDevice):
         at = 0
         for name, settings in self._estimates.items():
             place = slice(at, at := at + len(settings.values) + 2)
-            if name in self._others:
-                self._yoked.append((place, self._others[name]))
-            elif self._source:
+            if self._source:
                 self._received.append((place, Received(name, settings, self._source)))
 
     def begin_trial(self, trial: Trial) -> None:
         self._device.begin_trial(trial)
-        for each in self._others.values():
-            each.begin_trial(trial.number)
 
     def close(self) -> None:
         with ExitStack() as closing:
@@ -250,6 +194,4 @@ class WithEstimates(InputDevice):
         values = self._fallback.copy()
         for place, each in self._received:
             each.fill(values[place], tick.woke)
-        for place, other in self._yoked:
-            other.fill(values[place], tick.due)
         return np.concatenate([axes, values])

@@ -3,14 +3,13 @@
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from labcrane.core.records import Run, Value
 from labcrane.core.roles import Component, Controller, Dynamics, InputDevice, Task
 from labcrane.core.signals import Layout, Signal
 from labcrane.errors import ProtocolError
 from labcrane.protocol.assisted import Assisted, FourHands
-from labcrane.protocol.estimated import OthersValues, WithEstimates
+from labcrane.protocol.estimated import WithEstimates
 from labcrane.protocol.study import Study
 
 
@@ -44,18 +43,11 @@ class Rig:
         }
 
     @classmethod
-    def build(
-        cls,
-        study: Study,
-        *,
-        simulated: bool,
-        source: str = "",
-        others: Mapping[str, OthersValues] = MappingProxyType({}),
-    ) -> "Rig":
+    def build(cls, study: Study, *, simulated: bool, source: str = "") -> "Rig":
         """Build, but do not open, what ``study`` names; a simulated operator replaces the input.
 
         Estimates are received from the processes of the session ``source``; without one they fall
-        back. ``others`` takes the place of some.
+        back.
         """
         machine = study.machine
         device = (study.operator if simulated else study.input).build(machine)
@@ -65,7 +57,7 @@ class Rig:
         assert isinstance(device, InputDevice)  # noqa: S101
         assert isinstance(dynamics, Dynamics)  # noqa: S101
         if study.estimates:
-            device = WithEstimates(device, study.estimates, source, others)
+            device = WithEstimates(device, study.estimates, source)
         if isinstance(controller, Assisted):
             assistant = study.choices["assist"].build(machine)
             assert isinstance(assistant, InputDevice)  # noqa: S101

@@ -130,11 +130,6 @@ class Study:
         """Settings of the estimates, by the protocol's names."""
         return _estimates(self.choices)
 
-    @property
-    def blind(self) -> bool:
-        """Whether experimenters are not told the groups: those of some are yoked."""
-        return any(each.yoked for each in self.estimates.values())
-
     def window_title(self, view: str) -> str:
         """Return the title of a view's window."""
         return f"labcrane: {view} - {self.protocol.study}"
@@ -575,9 +570,8 @@ def _check_estimates(
     estimates: Mapping[str, EstimateSettings],
     taken: Container[str],
 ) -> None:
-    """Note estimates with a name that is taken or wrong, without a stream, or yoked wrongly."""
+    """Note estimates with a name that is taken or wrong, or without a stream."""
     single = [label for label, each in protocol.streams.items() if not each.several]
-    groups, yoked = protocol.design.groups, set[str]()
     for name, settings in estimates.items():
         if not name.isidentifier():
             message = f"{name!r} names columns; give a word of letters, digits and underscores"
@@ -592,14 +586,6 @@ def _check_estimates(
             there = nearest(settings.stream, single, "streams has")
             message = f"there is no single stream {settings.stream!r} under streams; {there}"
             source.problem(("estimates", name, "stream"), message)
-        for at, group in enumerate(settings.yoked):
-            if group not in groups:
-                message = f"there is no group {group!r}; {nearest(group, groups, 'design has')}"
-                source.problem(("estimates", name, "yoked", at), message)
-        yoked |= {*settings.yoked}
-        if groups and yoked >= {*groups}:
-            message = f"all groups are yoked ({', '.join(groups)}); one must have its own values"
-            source.problem(("estimates", name, "yoked"), message)
 
 
 def _with_beside(

@@ -24,7 +24,6 @@ from labcrane.protocol.study import Study
 from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.frame_log import FrameLog, FrameRow, columns, sizes
 from labcrane.recording.participant_file.reader import SessionRecord, open_recording
-from labcrane.recording.participant_file.relabel import ERASED
 from labcrane.replay.restore import differing_parts, restored_study
 from labcrane.replay.script import RecordOver, Script
 from labcrane.session import loop
@@ -119,11 +118,6 @@ def replay_session(
     if speed is not None and not speed > 0.0:
         raise ProtocolError(
             f"a speed of {speed:g} shows nothing; give one above 0, such as 2 for double speed"
-        )
-    if record.context.get("yoked_to") == ERASED:
-        raise RecordingError(
-            f"session {session} of {path} cannot be replayed: the values of estimates were those "
-            "of a participant who was erased, and were erased with the participant"
         )
     if (runs := int(record.events["part"].max())) > 1:
         raise RecordingError(

@@ -4,7 +4,7 @@ Two calls where a session is run: :func:`check_eligibility` before anything open
 repeated, and :func:`close_visit` when its participant file is written.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from datetime import date, datetime
 from typing import Any
 
@@ -16,7 +16,6 @@ from labcrane.participants.deviations import settle
 from labcrane.participants.folders import Places, keep_private
 from labcrane.participants.register import Sitting, read
 from labcrane.participants.session_windows import check_visit, enter_sitting
-from labcrane.participants.yoking import yoke
 from labcrane.registry.registry import discover
 from labcrane.session.visit import Visit
 
@@ -33,14 +32,11 @@ class Admission:
         For the record, ready for JSON.
     otherwise_installed
         What is installed in another way than when the study was approved, in words.
-    yoked
-        As of :func:`labcrane.participants.yoking.yoke`; empty for a session that continues.
     """
 
     slot: int | None
     context: dict[str, Any]
     otherwise_installed: tuple[str, ...] = ()
-    yoked: dict[str, Any] = field(default_factory=dict)
 
 
 EXEMPT = Admission(None, {"approval": "none"})
@@ -55,11 +51,10 @@ def check_eligibility(visit: Visit, today: date | None = None) -> Admission:
     ProtocolError
         The study is not what was approved, or the packages are not and the protocol refuses that,
         the lock was rewritten by hand, the approval has expired, the participant is not in the
-        register, has not consented to the approved text, was excluded, or comes too early or late;
-        or sessions of others come before this one, as some are yoked.
+        register, has not consented to the approved text, was excluded, or comes too early or late.
     """
     if visit.simulated or visit.pilot:
-        return replace(EXEMPT, yoked=_yoked(visit, None))
+        return EXEMPT
     today = today or datetime.now().astimezone().date()
     places = Places(visit.data)
     visit.study.check_participant(visit.participant)
@@ -81,7 +76,6 @@ def check_eligibility(visit: Visit, today: date | None = None) -> Admission:
         amendment=len(lock.amendments),
         consent=lock.consent_version,
     )
-    yoked = _yoked(visit, entry.slot)
     make_folder(visit.folder.path)
     enter_sitting(places, visit.participant, sitting)
     others = tuple(otherwise_installed(lock))
@@ -99,16 +93,7 @@ def check_eligibility(visit: Visit, today: date | None = None) -> Admission:
             "otherwise_installed": list(others),
         },
         others,
-        yoked,
     )
-
-
-def _yoked(visit: Visit, slot: int | None) -> dict[str, Any]:
-    if visit.resumed or not visit.study.blind or (visit.fast and visit.simulated):
-        return {}
-    visit.study.check_participant(visit.participant)
-    visit.study.check_session(visit.session)
-    return yoke(visit.study, visit.folder, visit.session, slot)
 
 
 def close_visit(visit: Visit) -> None:

@@ -14,27 +14,21 @@ LOST, BACK = "estimate.lost", "estimate.back"
 
 
 def reporters(
-    estimates: Mapping[str, EstimateSettings],
-    axes: Layout,
-    log: FrameLog,
-    console: Console | None,
+    estimates: Mapping[str, EstimateSettings], axes: Layout, log: FrameLog, console: Console
 ) -> list[Callable[[Frame], None]]:
     """Return what reports a study's estimates in each tick; none where it has none."""
     return [EstimateReporter(estimates, axes, log, console)] if estimates else []
 
 
 class EstimateReporter:
-    """Notes each change of an estimate's state as an event, and reports it to a console.
-
-    There is none in a blind study: a state may be that of another participant's stream.
-    """
+    """Notes each change of an estimate's state as an event, and tells the experimenter."""
 
     def __init__(
         self,
         estimates: Mapping[str, EstimateSettings],
         axes: Layout,
         log: FrameLog,
-        console: Console | None,
+        console: Console,
     ) -> None:
         self._places = {name: axes.index(f"{OF_ESTIMATE}{name}.state") for name in estimates}
         self._states: dict[str, float | None] = dict.fromkeys(estimates)
@@ -50,5 +44,4 @@ class EstimateReporter:
                 about["why"] = WORDS[state]
             event = Event(BACK if state is State.OK else LOST, frame.tick.due, about)
             self._log.append(event, frame.tick.number)
-            if self._console is not None:
-                self._console.report(event)
+            self._console.report(event)

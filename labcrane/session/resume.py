@@ -85,8 +85,6 @@ class Progress:
         What every trial told its track, by trial number, in the order in which they ended.
     carried
         What trials of earlier sessions told their tracks.
-    yoked
-        Which estimates have the values of another participant, and whose.
     judged
         Whether the session waits for the experimenter to judge its tests.
     unjudged
@@ -112,7 +110,6 @@ class Progress:
     held: set[str] = field(default_factory=set)
     responses: dict[int, Response] = field(default_factory=dict)
     carried: tuple[Response, ...] = ()
-    yoked: dict[str, Any] = field(default_factory=dict)
     judged: bool = False
     unjudged: Mapping[str, Any] | None = None
 
@@ -122,7 +119,6 @@ class Progress:
             case "session.start":
                 self.stop, self.called_complete = KILLED, False
                 self.carried, self.judged = carried_in(data), judged_in(data)
-                self.yoked = {name: data[name] for name in ("yoked_to", "yoked") if name in data}
             case "session.end":
                 self.stop = str(data["reason"])
                 self.called_complete = self.stop == COMPLETE

@@ -1,8 +1,8 @@
 """Session: the rig is opened, led through its plan, and leaves a participant file."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +18,9 @@ from labcrane.design.tracks import Response
 from labcrane.doctor.scheduling import lateness
 from labcrane.errors import DeviceError, PluginError, ProtocolError
 from labcrane.files.lock import held
-from labcrane.participants.yoking import others_values
 from labcrane.processes.real_time import real_time
 from labcrane.processes.wake_lock import wake_lock
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import Study
 from labcrane.recording.crash_marker import CrashMarker, clear, read_crash_marker
 from labcrane.recording.frame_log import BatchLog, FrameLog, columns, frame_bytes
 from labcrane.recording.journal import SessionJournal
@@ -195,9 +193,7 @@ def _record(
         claim(visit)
     carried = _carried(visit) if so_far is None else so_far.carried
     source = "" if visit.fast else visit.source
-    yoked = admission.yoked if so_far is None else so_far.yoked
-    others = others_values(study, visit.folder, visit.session, yoked)
-    rig = Rig.build(study, simulated=visit.simulated, source=source, others=others)
+    rig = Rig.build(study, simulated=visit.simulated, source=source)
     clock = _clock(visit, so_far)
     died = visit.died or read_crash_marker(visit.crash_marker) if visit.resumed else None
     with (
@@ -210,7 +206,7 @@ def _record(
             rig.dynamics.reset(within_limits(study, so_far.angles))
         second = frame_bytes(run) * run.rate_hz
         visit.folder.check_space(plan.expected_s, second, RESERVE_S)
-        about = context(visit, whole, rig, run) | admission.context | scheduling | awake | yoked
+        about = context(visit, whole, rig, run) | admission.context | scheduling | awake
         if study.protocol.design.tracks:
             about["carried"] = [asdict(each) for each in carried]
         awaits = (*study.views, *study.sounds) if visit.feedback else ()
@@ -232,9 +228,8 @@ def _record(
                 _triggers(visit, run, log, console) as triggers,
                 _outlets(visit, whole, done, run, offer) as outlets,
             ):
-                told = None if study.blind else console
-                estimates = reporters(study.estimates, run.axes, log, told)
-                sinks = [*triggers, *estimates, *_shown(study, *outlets, _teller(console))]
+                estimates = reporters(study.estimates, run.axes, log, console)
+                sinks = [*triggers, *outlets, *estimates, _teller(console)]
                 if not visit.fast:
                     sinks.append(OverrunReporter(study.call_monitor, run.rate_hz, log, console))
                 ahead = None
@@ -445,24 +440,6 @@ def _teller(console: Console) -> Callable[[Frame], None]:
             console.report(event)
 
     return tell
-
-
-def _shown(study: Study, *sinks: Callable[[Frame], None]) -> Sequence[Callable[[Frame], None]]:
-    """Return sinks that people can see, which in a blind study get no group."""
-    return [_without_group(show) for show in sinks] if study.blind else sinks
-
-
-def _without_group(show: Callable[[Frame], None]) -> Callable[[Frame], None]:
-    """Return what shows the events of each frame without the participant's group."""
-
-    def shown(frame: Frame) -> None:
-        events = [
-            replace(event, data={key: each for key, each in event.data.items() if key != "group"})
-            for event in frame.events
-        ]
-        show(replace(frame, events=tuple(events)) if events else frame)
-
-    return shown
 
 
 @contextmanager

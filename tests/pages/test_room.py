@@ -58,7 +58,6 @@ class Punctual:
     """A loop that is in time."""
 
     lateness_s: float | None = 0.0
-    trouble: str = ""
     silent_s: float | None = 0.0
 
 
@@ -519,25 +518,6 @@ def test_the_strip_of_steps_says_what_is_done_what_runs_and_how_long_each_takes(
         assert [step["state"] for step in found] == states
         assert [step["name"] for step in found] == ["instructions", "break", "aiming"]
         assert [step["time"] for step in found[:2]] == ["2 min", "5 min"]
-
-
-def test_the_page_is_the_same_for_yoked_participants_and_others(tmp_path: Path) -> None:
-    yoked = "estimates: {load: {use: band_power, stream: eeg, channels: [F], per_channels: [P], "
-    yoked += "fallback: {ratio: 1}, yoked: YOKED}}\ndesign: {groups: {a: [], b: []}}\n"
-    steps = "      - block: {task: aiming}\n"
-    path, heads = tmp_path / "study.yaml", {}
-    for which in ("[b]", "[]"):
-        more = "streams: {eeg: {type: EEG, name: amp}}\n" + yoked.replace("YOKED", which)
-        path.write_text(STUDY.format(study="yoked", steps=steps) + more, encoding="utf-8")
-        study = loaded(path)
-        for name in ("P001", "P002"):
-            context = SimpleNamespace(
-                study=study, plan=plan_session(study, name, 1), session=after(), live=Punctual(),
-                participant="P", shown=SimpleNamespace(trouble=""),
-            )  # fmt: skip
-            heads[which, name] = Snapshot(context, Earlier())._head()
-    assert heads["[b]", "P001"] == heads["[b]", "P002"]
-    assert heads["[]", "P001"]["condition"] != heads["[]", "P002"]["condition"]
 
 
 def test_times_are_minutes_and_seconds_and_hours_where_there_are_some() -> None:

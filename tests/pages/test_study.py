@@ -135,17 +135,6 @@ def test_consent_to_an_earlier_text_and_none_at_all_stand_out(lab: Lab, tmp_path
 
 
 @pytest.mark.slow
-def test_a_study_with_yoked_groups_shows_no_groups(
-    lab: Lab, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert {person.group for person in overview(lab).people} == {"none", "visual", "sound"}
-    written, yoked = Reader._text, {"estimates": {"load": {"yoked": ["visual"]}}}
-    monkeypatch.setattr(Reader, "_text", lambda self, found: {**written(self, found), **yoked})
-    assert {person.group for person in overview(lab).people} == {""}
-    assert overview(lab).groups == {}
-
-
-@pytest.mark.slow
 def test_groups_are_counted_by_their_slots(lab: Lab) -> None:
     found = overview(lab)
     assert sum(held for held, _ in found.groups.values()) == 3, "who left holds none"

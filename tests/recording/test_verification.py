@@ -18,11 +18,7 @@ from labcrane.recording.participant_file import relabel as relabel_module
 from labcrane.recording.participant_file import writer as writer_module
 from labcrane.recording.participant_file.about import ABOUT
 from labcrane.recording.participant_file.recorrect import recorrect
-from labcrane.recording.participant_file.relabel import (
-    Rewriting,
-    relabel_journal,
-    relabel_participant_file,
-)
+from labcrane.recording.participant_file.relabel import relabel_journal, relabel_participant_file
 from labcrane.recording.participant_file.writer import consolidate
 from labcrane.session.postprocess import conclude
 
@@ -151,7 +147,7 @@ def test_whatever_changes_while_a_file_is_relabelled_is_noticed(
 
     monkeypatch.setattr(relabel_module, "bring_to_disk", badly)
     with pytest.raises(RecordingError, match="check the disk"):
-        relabel_participant_file(path, tmp_path / "P002.h5", Rewriting("P001", "P002"), {})
+        relabel_participant_file(path, tmp_path / "P002.h5", "P001", "P002", {})
     assert path.read_bytes() == before
 
 
@@ -169,9 +165,7 @@ def test_a_text_that_changes_while_a_journal_is_relabelled_is_noticed(
 
     monkeypatch.setattr(XdfWriter, "write_texts", badly)
     with pytest.raises(RecordingError, match="does not read as"):
-        relabel_journal(
-            folder / f"ses-01_{kind}.xdf", tmp_path / "new.xdf", Rewriting("P001", "P002")
-        )
+        relabel_journal(folder / f"ses-01_{kind}.xdf", tmp_path / "new.xdf", "P001", "P002")
 
 
 def test_a_stream_whose_serial_number_names_the_participant_is_relabelled(tmp_path: Path) -> None:
@@ -182,7 +176,7 @@ def test_a_stream_whose_serial_number_names_the_participant_is_relabelled(tmp_pa
     header = StreamHeader.from_xml(text.replace("<desc>", f"<desc>{serial}"))
     with XdfWriter(tmp_path / "old.xdf") as writer:
         writer.write_sample(writer.add_stream(header), 1.0, np.array([2.0]))
-    relabel_journal(tmp_path / "old.xdf", tmp_path / "new.xdf", Rewriting("P001", "P002"))
+    relabel_journal(tmp_path / "old.xdf", tmp_path / "new.xdf", "P001", "P002")
     (stream,) = read_streams([tmp_path / "new.xdf"])[0]
     assert "a study/P002/ses-01" in str(stream.header.text)
     assert "P001" not in str(stream.header.text)
@@ -198,8 +192,8 @@ def test_what_is_as_it_was_is_accepted(folder: Path, tmp_path: Path) -> None:
     for each in (1, 2):
         for kind in ("run", "streams"):
             journal = folder / f"ses-0{each}_{kind}.xdf"
-            relabel_journal(journal, tmp_path / journal.name, Rewriting("P001", "P002"))
-    relabel_participant_file(path, tmp_path / "P002.h5", Rewriting("P001", "P002"), {})
+            relabel_journal(journal, tmp_path / journal.name, "P001", "P002")
+    relabel_participant_file(path, tmp_path / "P002.h5", "P001", "P002", {})
     assert len(read_streams([folder / "ses-02_streams.xdf"])[0]) == 2
     with h5py.File(tmp_path / "P002.h5") as file:
         assert set(file) == {"ses-01", "ses-02", *ABOUT}

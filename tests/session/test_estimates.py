@@ -13,7 +13,7 @@ from labcrane.analysis import Participant
 from labcrane.analysis.cohort import Status
 from labcrane.analysis.quality import estimates_quality
 from labcrane.protocol import estimated, rig
-from labcrane.protocol.estimated import WORDS, OthersValues, State, WithEstimates
+from labcrane.protocol.estimated import WORDS, State, WithEstimates
 from labcrane.protocol.questions import questions
 from labcrane.protocol.streams import StreamNeed
 from labcrane.replay import replay_session
@@ -74,7 +74,7 @@ def recorded(folder: Path, written: str) -> Path:
 @pytest.fixture
 def scripted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(estimated, "Received", Scripted)
-    monkeypatch.setattr(rig, "WithEstimates", lambda *of: WithEstimates(*of[:2], "any", *of[3:]))
+    monkeypatch.setattr(rig, "WithEstimates", lambda *given: WithEstimates(*given[:2], "any"))
 
 
 @pytest.mark.parametrize("name", ["adaptive_assist", "adaptive_sphere"])
@@ -239,54 +239,12 @@ def test_without_any_value_a_rule_is_not_met_and_the_record_says_that_it_was_not
     assert len(unjudged) == 2 * len({data["trial"] for data in unjudged}) > 0
 
 
-def test_another_participant_s_values_are_aligned_trial_by_trial_and_end_with_the_record() -> None:
-    due = 500.0 + np.arange(40) / 10  # 4 s; trial 1 begins after 1 s, trial 2 after 2 s
-    rows = np.column_stack([np.arange(40.0), due - 0.2, np.zeros(40)])
-    others = OthersValues(due, {1: 501.0, 2: 502.0}, rows, oldest=0.5)
-
-    def used(now: float) -> list[float]:
-        out = np.array([-1.0, math.nan, State.NO_DATA])
-        others.fill(out, now)
-        return out.tolist()
-
-    assert used(9000.0) == pytest.approx([0, 8999.8, State.OK]), "with the record's beginning"
-    assert used(9000.3) == pytest.approx([3, 9000.1, State.OK])
-    others.begin_trial(1)
-    assert [used(9007.0 + after)[0] for after in (0.0, 0.1, 1.5)] == [10, 11, 25], "beyond its end"
-    others.begin_trial(3)
-    assert used(9009.0)[0] == 30, "the other has no such trial, and the time goes on"
-    others.begin_trial(2)
-    assert [used(9020.0 + after)[0] for after in (0.0, 1.9, 2.4)] == [20, 39, 39]
-    assert used(9022.5)[::2] == [-1.0, State.NO_DATA]
-
-
-@pytest.mark.slow
-def test_a_study_with_yoked_groups_tells_no_experimenter_the_group(tmp_path: Path) -> None:
-    for name, groups in (("P001", "[b]"), ("P002", "[b]"), ("P001", "[]")):
-        told = ScriptedConsole()
-        study = a_study(tmp_path, yoked(groups, "{a: [], b: []}"))
-        visit = Visit(study, name, 1, tmp_path / f"data{groups}", simulated=True, fast=True)
-        session = open_recording(run(visit, told)).session(1)
-        trials = [event.data for event in told.told if event.name.startswith("trial.")]
-        assert {"group" in each for each in trials} == {groups == "[]"}
-        assert set(session.trials["group"]) <= {"a", "b"}
-        assert set(session.streams["input"].data["estimate.load.ratio"]) == {2.0}, "the fallback"
-
-
-def yoked(groups: str, design: str, share: str = "1") -> str:
-    written = text(share).replace("{ratio: 2}", f"{{ratio: 2}}, yoked: {groups}")
-    return written.replace("sessions:", f"design: {{groups: {design}}}\nsessions:")
-
-
 REFUSED = {
     r"stop_rules\[1\].estimate is 'load.ration', .* did you mean 'load.ratio'": text("1")
     + "stop_rules: [{estimate: load.ration, above: 2}]\n",
     "a questionnaire and its score, or else an estimate": text("1")
     + "stop_rules: [{estimate: load.ratio, score: total, above: 2}]\n",
     "write above or below, one of them": text("1") + "stop_rules: [{estimate: load.ratio}]\n",
-    "there is no group 'bb'; did you mean 'b'": yoked("[bb]", "{a: [], b: []}"),
-    r"all groups are yoked \(a, b\); one must have its own": yoked("[a, b]", "{a: [], b: []}"),
-    "there is no group 'b'; design has none": yoked("[b]", "{}"),
     r"assist.share.estimate is 'load.ration', .* no such estimate; did you mean 'load.ratio'": text(
         SHARE.replace("ratio", "ration")
     ),

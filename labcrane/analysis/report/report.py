@@ -571,7 +571,7 @@ def _syncs(page: Page, tables: Tables) -> None:
         "estimates",
         tables["estimates"],
         "How long after the time that a value stands for the first tick used it, and the part of "
-        "the ticks that used the fallback. Yoked participants had the values of another one.",
+        "the ticks that used the fallback.",
         "Estimates",
     )
     page.rows(

@@ -205,7 +205,7 @@ def plan(
             line = f"{key_of(each.place)}: {each.written} is {each.value:g} {each.unit}"
             out.print(line, markup=False)
     for session in plans:
-        _print(study, session)
+        _print(session)
     for line in lines:
         out.print(line, markup=False)
     if export:
@@ -304,16 +304,7 @@ def _track_row(block: "PlannedBlock") -> dict[str, object] | None:
     }
 
 
-def _before(study: "Study", plan: "SessionPlan") -> tuple[int, ...]:
-    """Return the slots whose sessions come before a participant's, as some groups are yoked."""
-    from labcrane.design.slots import slots_before
-
-    yoked = {group for each in study.estimates.values() for group in each.yoked}
-    groups = tuple(study.protocol.design.groups)
-    return slots_before(study.protocol.study, groups, yoked, plan.slot)
-
-
-def _print(study: "Study", plans: "Sequence[SessionPlan]") -> None:
+def _print(plans: "Sequence[SessionPlan]") -> None:
     from textwrap import fill
 
     whole = plans[0].expected_s / 60
@@ -321,10 +312,7 @@ def _print(study: "Study", plans: "Sequence[SessionPlan]") -> None:
     for plan in plans:
         groups = {block.group for block in plan.blocks if block.group}
         group = f", group {', '.join(sorted(groups))}" if groups else ""
-        slots = ", ".join(map(str, _before(study, plan)))
-        after = f", after session {plan.number} of slots {slots}" * bool(slots)
-        line = f"{plan.participant}: slot {plan.slot}{group}, seed {plan.seed}{after}"
-        out.print(line, markup=False)
+        out.print(f"{plan.participant}: slot {plan.slot}{group}, seed {plan.seed}", markup=False)
         for step in plan.steps:
             line = _block(step.block) if step.block else _other(step)
             width = out.console.width

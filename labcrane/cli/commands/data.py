@@ -178,7 +178,7 @@ def _say(reach: "Reach") -> None:
         out.print(f"changed: {path}", markup=False)
     for what in reach.again:
         out.print(
-            f"removed, since it was made of this participant's data too; make it again: {what}",
+            f"removed, since it was computed from all participants' data; make it again: {what}",
             markup=False,
         )
     for owed in reach.owed:

@@ -129,7 +129,7 @@ def consent(
     entry = confirm_consent(
         places, loaded, participant, text, today(), beyond_planned=beyond_planned
     )
-    group = f", group {entry.group}" if entry.group and not loaded.blind else ""
+    group = f", group {entry.group}" if entry.group else ""
     out.print(
         f"{participant} has consented to {text[0]} (version {text[1]}); slot {entry.slot}{group}, "
         f"seed {entry.seed}",

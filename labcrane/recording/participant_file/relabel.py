@@ -1,22 +1,17 @@
 """Relabelling of a recording: written once more, under another pseudonym.
 
-So is the recording of those who are yoked to a participant who is relabelled or erased: with the
-other's new name, or without the other's values. Everything else is as it was: the new file is read
-again and compared before it is used.
+Everything else is as it was: the new file is read again and compared before it is used.
 """
 
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from labcrane.core.by_estimate import OF_ESTIMATE
 from labcrane.errors import RecordingError
-from labcrane.recording.journal import FRAMES, START
+from labcrane.recording.journal import START
 from labcrane.recording.participant_file.columns import (
     holds_texts,
     text_of,
@@ -33,16 +28,12 @@ from labcrane.recording.xdf.writer import XdfWriter
 
 if TYPE_CHECKING:
     import h5py
-    import numpy.typing as npt
 
 SAMPLES = 100_000
 """Numbers are written in chunks of so many samples."""
 
 FORMERLY = "formerly"
 """Under which name the old pseudonym stays in the record."""
-
-ERASED = "erased"
-"""Source of a yoked session whose source was erased."""
 
 Rename = Callable[[str], str]
 
@@ -53,79 +44,17 @@ def renaming(old: str, new: str) -> Rename:
     return lambda text: pattern.sub(new, text)
 
 
-class Rewriting:
-    """What changes in a recording that is written once more.
-
-    Parameters
-    ----------
-    old, new
-        Names.
-    own
-        Whether the recording is that of ``old``, whose name then stays in it.
-    session, values
-        Of which session, as its group in the file, which values of estimates are taken out, as
-        ``load.ratio``.
-    """
-
-    def __init__(
-        self,
-        old: str,
-        new: str,
-        *,
-        own: bool = True,
-        session: str = "",
-        values: Sequence[str] = (),
-    ) -> None:
-        self.rename = renaming(old, new)
-        self.formerly = old if own else ""
-        self.empties = bool(values)
-        times = {f"{value.partition('.')[0]}.time" for value in values}
-        self._columns = {OF_ESTIMATE + each for each in (*values, *times)}
-        self._results = {value.replace(".", "_") for value in values}
-        self._nodes = {
-            *(f"{session}/input/{column.replace('.', '/')}" for column in self._columns),
-            *(f"{session}/trials/{result}" for result in self._results),
-        }
-        self._events = f"{session}/events/data"
-
-    def event(self, text: str) -> str:
-        """Return the text of an event as it is written now."""
-        text = self.rename(text)
-        if self.formerly:
-            return _with_record(text, self.formerly)
-        if not self.empties:
-            return text
-        content = json.loads(text)
-        gone = dict.fromkeys(content.keys() & self._results)
-        return json.dumps({**content, **gone}, ensure_ascii=False) if gone else text
-
-    def numbers(self, header: StreamHeader, data: "npt.NDArray[Any]") -> "npt.NDArray[Any]":
-        """Return the numbers of a journal's stream as they are written now."""
-        if not self.empties or header.name != FRAMES:
-            return data
-        gone = [label in self._columns for label in header.labels]
-        return np.where(gone, np.nan, data)
-
-    def empties_node(self, name: str) -> bool:
-        """Whether a column of the participant file is emptied."""
-        return name.removeprefix("/") in self._nodes
-
-    def holds_results(self, name: str) -> bool:
-        """Whether a node of the participant file has events whose results are taken out."""
-        return self.empties and name.removeprefix("/") == self._events
-
-
-def relabel_journal(source: Path, target: Path, change: Rewriting) -> None:
+def relabel_journal(source: Path, target: Path, old: str, new: str) -> None:
     """Write a journal again as ``target``, which is replaced.
 
     Raises
     ------
     RecordingError
-        The journal is damaged, or the new one does not read as the old one does. One from which
-        values are taken out may be damaged: what can be read is kept.
+        The journal is damaged, or the new one does not read as the old one does.
     """
+    rename = renaming(old, new)
     file = read_xdf(source)
-    if not change.empties and (file.damaged or file.unchecked or file.nameless):
+    if file.damaged or file.unchecked or file.nameless:
         raise RecordingError(
             f"{source} is damaged and cannot be relabelled without losing what is left; keep it, "
             "and note the right number in the study's log"
@@ -133,16 +62,17 @@ def relabel_journal(source: Path, target: Path, change: Rewriting) -> None:
     target.unlink(missing_ok=True)
     with XdfWriter(target) as writer:
         for stream in _own(file):
-            _write_stream(writer, stream, change)
+            _write_stream(writer, stream, rename, old)
     bring_to_disk(target)
     for before, after in zip(_own(file), _own(read_xdf(target)), strict=True):
         same = (
             before.stamps.tobytes() == after.stamps.tobytes()
-            and change.numbers(before.header, before.data).tobytes() == after.data.tobytes()
+            and before.data.tobytes() == after.data.tobytes()
             and before.offsets.tobytes() == after.offsets.tobytes()
-            and _renamed_header(before.header, change.rename) == after.header
-            and [tuple(map(change.event, row)) for row in before.texts]
-            == [tuple(row) for row in after.texts]
+            and _renamed_header(before.header, rename) == after.header
+            and [
+                tuple(_with_record(rename(text), old) for text in row) for row in before.texts
+            ] == [tuple(row) for row in after.texts]
         )  # fmt: skip
         if not same:
             raise RecordingError(f"{target} does not read as {source} does; check the disk")
@@ -153,17 +83,18 @@ def _own(file: XdfFile) -> list[XdfStream]:
     return [stream for stream in file.streams if stream.header.name != CHECK_NAME]
 
 
-def _write_stream(writer: XdfWriter, stream: XdfStream, change: Rewriting) -> None:
-    header = _renamed_header(stream.header, change.rename)
+def _write_stream(writer: XdfWriter, stream: XdfStream, rename: Rename, old: str) -> None:
+    header = _renamed_header(stream.header, rename)
     number = writer.add_stream(header)
     for start in range(0, len(stream.stamps), SAMPLES):
         part = slice(start, start + SAMPLES)
         if header.format == "string":
-            rows = [tuple(map(change.event, row)) for row in stream.texts[part]]
+            rows = [
+                tuple(_with_record(rename(text), old) for text in row) for row in stream.texts[part]
+            ]
             writer.write_texts(number, stream.stamps[part].tolist(), rows)
         else:
-            numbers = change.numbers(header, stream.data[part])
-            writer.write_samples(number, stream.stamps[part], numbers)
+            writer.write_samples(number, stream.stamps[part], stream.data[part])
     for when, offset in stream.offsets.tolist():
         writer.write_offset(number, when, offset)
 
@@ -190,7 +121,7 @@ def _recorded(context: dict[str, Any], old: str) -> dict[str, Any]:
 
 
 def relabel_participant_file(
-    source: Path, target: Path, change: Rewriting, sizes: dict[str, int]
+    source: Path, target: Path, old: str, new: str, sizes: dict[str, int]
 ) -> None:
     """Write a participant file again as ``target``, which is replaced.
 
@@ -204,19 +135,20 @@ def relabel_participant_file(
     target.unlink(missing_ok=True)
     try:
         with h5py.File(source, "r") as before, h5py.File(target, "w-") as after:
-            _copy_group(before, after, change)
-            if change.formerly:
-                after.attrs[FORMERLY] = _formerly(before, change.formerly)
+            _copy_group(before, after, renaming(old, new))
+            after.attrs[FORMERLY] = _formerly(before, old)
             for session in (node for name, node in after.items() if name.startswith("ses-")):
-                if change.formerly:
-                    _keep_name(session, change.formerly)
+                session.attrs[FORMERLY] = _formerly(session, old)
+                context = _recorded(json.loads(text_of(session["context"])), old)
+                del session["context"]
+                write_text(session, "context", json.dumps(context, ensure_ascii=False))
                 journals = session["journals"]
                 for number, name in enumerate(texts_of(journals["name"])):
                     journals["size"][number] = sizes.get(name, journals["size"][number])
         put_seal(target)
         bring_to_disk(target)
         with h5py.File(source, "r") as before, h5py.File(target, "r") as after:
-            lost = next(unlike(before, after, _changing(change), change.rename), None)
+            lost = next(unlike(before, after, _made_anew, renaming(old, new)), None)
     except (OSError, KeyError, ValueError) as error:
         raise RecordingError(f"cannot relabel {source}: {error}; it is as it was") from error
     if lost is not None:
@@ -228,42 +160,24 @@ def relabel_participant_file(
 _ANEW = re.compile(rf"ses-[^/]+/(context|journals/size)(@.*)?|(ses-[^/]+)?@{FORMERLY}")
 
 
-def _changing(change: Rewriting) -> Callable[[str], bool]:
-    """Return whether a node, or an attribute, has another content after a relabelling."""
-
-    def changes(name: str) -> bool:
-        own = _ANEW.fullmatch(name) is not None
-        return own or change.empties_node(name) or change.holds_results(name)
-
-    return changes
-
-
-def _keep_name(session: "h5py.Group", old: str) -> None:
-    session.attrs[FORMERLY] = _formerly(session, old)
-    context = _recorded(json.loads(text_of(session["context"])), old)
-    del session["context"]
-    write_text(session, "context", json.dumps(context, ensure_ascii=False))
+def _made_anew(name: str) -> bool:
+    """Whether a node, or an attribute, says something else after a relabelling."""
+    return _ANEW.fullmatch(name) is not None
 
 
 def _formerly(node: "h5py.HLObject", old: str) -> str:
     return ", ".join([*([node.attrs[FORMERLY]] if FORMERLY in node.attrs else []), old])
 
 
-def _copy_group(before: "h5py.Group", after: "h5py.Group", change: Rewriting) -> None:
+def _copy_group(before: "h5py.Group", after: "h5py.Group", rename: Rename) -> None:
     import h5py  # noqa: PLC0415
 
-    rename = change.rename
     _copy_attributes(before, after, rename)
     for name, node in before.items():
         if isinstance(node, h5py.Group):
-            _copy_group(node, after.create_group(name), change)
+            _copy_group(node, after.create_group(name), rename)
             continue
-        if change.empties_node(node.name):
-            # Never copied: what is written over in a file may stay in its free space.
-            after.create_dataset_like(name, node, data=np.full(node.shape, np.nan))
-        elif change.holds_results(node.name):
-            write_texts(after, name, [change.event(text) for text in texts_of(node)])
-        elif not holds_texts(node):
+        if not holds_texts(node):
             before.copy(name, after)
         elif node.shape == ():
             write_text(after, name, rename(text_of(node)))

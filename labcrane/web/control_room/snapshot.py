@@ -72,8 +72,7 @@ class Snapshot:
             "who": f"{context.participant} · session {plan.number}",
             "condition": " · ".join(filter(None, [
                 context.study.protocol.title or context.study.protocol.study, plan.name,
-                f"group {plan.group}" if plan.group and not context.study.blind else "",
-                self._practice(),
+                plan.group and f"group {plan.group}", self._practice(),
             ])),
             "state": state,
             "now": self._running() if state == "running" else STATES[state],

@@ -132,8 +132,7 @@ class Overview:
     Attributes
     ----------
     groups
-        How many hold a slot in each group, and how many of them are complete; empty in a blind
-        study.
+        How many hold a slot in each group, and how many of them are complete.
     balanced
         Whether the groups differ by one at most.
     approval
@@ -211,7 +210,7 @@ class Reader:
             everyone(self.data, struck(places), unregistered(places)) if self.data.is_dir() else []
         )
         text = self._text(recorded)
-        planned, blind = _planned(text), _is_blind(text)
+        planned = _planned(text)
         version = self._consent_version()
         deviations: dict[str, list[Deviation]] = {}
         for name, each in all_deviations(places):
@@ -225,7 +224,6 @@ class Reader:
         people = [
             replace(
                 person,
-                group="" if blind else person.group,
                 due=_due(planned, person, register.participants.get(person.name), today),
                 deviations=tuple(deviations.get(person.name, ())),
             )
@@ -239,7 +237,7 @@ class Reader:
             folder=self.data,
             planned=planned,
             people=tuple(people),
-            groups={} if blind else _groups(text, register, people),
+            groups=_groups(text, register, people),
             approval=self._approval(today),
             used=used,
             free=free,
@@ -392,13 +390,6 @@ def _due(
     first, last = days
     state = "later" if today < first else "due" if today <= last else "overdue"
     return Due(coming.number, coming.name, state, first, last)
-
-
-def _is_blind(text: Mapping[str, Any]) -> bool:
-    """Whether experimenters are not told the groups, as of :attr:`Study.blind`."""
-    estimates = text.get("estimates")
-    each = estimates.values() if isinstance(estimates, dict) else ()
-    return any(isinstance(one, dict) and one.get("yoked") for one in each)
 
 
 def _groups(
