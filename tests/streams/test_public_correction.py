@@ -335,3 +335,29 @@ def test_samples_stamped_by_windows_timer_in_milliseconds_are_within_what_is_sta
         arrivals = came if seed % 2 else None
         found = correct(stamps, probes=probes, rate_hz=rate, arrivals=arrivals)
         assert np.mean(np.abs(found.time - true) <= found.error) >= 0.95
+
+
+@pytest.mark.parametrize("every_s", [2.0, 1.0, 0.8, 0.75, 1 / 3])
+@pytest.mark.parametrize("count", [3, 5, 10, 19, 20, 100])
+def test_markers_on_a_schedule_are_of_no_coarse_clock(every_s: float, count: int) -> None:
+    draw = np.random.default_rng([count, round(1e3 * every_s)])
+    pauses = np.r_[draw.choice([1.0, 1.0, 2.0, 3.0], count - 1), 2.0]
+    true = 1.0 + np.cumsum(every_s * pauses) + draw.normal(0.0, 1e-4, count)
+    asked = np.arange(0.2, true[-1] + 3.0, 2.0)
+    probes = np.column_stack(
+        [asked + 100.0, np.full(len(asked), -100.0), np.full(len(asked), 3e-4)]
+    )
+    found = correct(true + 100.0, probes=probes, rate_hz=0.0)
+    assert found.error.max() < 1e-3
+
+
+def test_a_packet_of_one_stamp_behind_a_restart_is_corrected() -> None:
+    """A period of 0 was divided by."""
+    taken = np.r_[1.0 + np.arange(3000) / 100, 41.0 + np.arange(20) / 100]
+    packets = np.arange(3020) // 20 * 20 + 19
+    sent = taken[packets] + 0.004
+    asked = np.r_[np.arange(0.2, 31.0, 2.0), 41.1, 41.6, 42.5, 44.0]
+    ahead = np.where(asked < 36.0, 100.0, 500.0)
+    probes = np.column_stack([asked + ahead, -ahead, np.full(len(asked), 3e-4)])
+    found = correct(sent + np.where(sent < 36.0, 100.0, 500.0), probes=probes, rate_hz=100.0)
+    assert np.mean(np.abs(found.time - taken) <= found.error) >= 0.95

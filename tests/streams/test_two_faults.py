@@ -438,6 +438,25 @@ def test_a_step_of_the_clock_hides_no_delay_that_changed(seed: int, way: str) ->
     assert np.mean(np.abs(corrected.time - t) <= corrected.error) >= 0.95
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_steps_of_its_clock_alone_leave_an_exact_device_as_it_is(seed: int) -> None:
+    """A step that was put beside its sample was counted twice, and for all samples: 49 ms."""
+    random = np.random.default_rng([15, seed])
+    rate, seconds = float(random.choice([100.0, 250.0, 500.0])), random.uniform(100.0, 200.0)
+    t = 1.0 + np.arange(int(rate * seconds)) / (rate * (1.0 + random.uniform(-3e-5, 3e-5)))
+    clock = some_clock(random)
+    at = np.arange(0.0, t[-1], 1.0)
+    stepped, probed = clock(t), clock(at)
+    for step_at in random.uniform(0.1, 0.9, random.integers(1, 6)) * seconds:
+        by = random.choice([-1.0, 1.0]) * np.exp(random.uniform(np.log(0.01), np.log(5.0)))
+        stepped, probed = stepped + by * (t >= step_at), probed + by * (at >= step_at)
+    probes = np.column_stack([probed, at - probed, np.full(len(at), 2e-4)])
+    count = np.arange(float(len(t))) if random.integers(2) else None
+    corrected = correct(stepped, probes=probes, rate_hz=rate, counter=count)
+    assert np.mean(np.abs(corrected.time - t) <= corrected.error) >= 0.95
+    assert np.median(corrected.error) < 1e-3
+
+
 def by_polls(random: np.random.Generator, ready: np.ndarray, rate: float) -> np.ndarray:
     """Return when samples are stamped by a program that polls at an interval of its own."""
     every = random.choice([random.uniform(0.3, 0.95), random.uniform(1.05, 3.0)]) / rate

@@ -4,6 +4,9 @@ A step of the source's clock leaves its sampler and its way alone. What changed 
 behind it, so that both sides are compared.
 """
 
+import itertools
+from dataclasses import replace
+
 import numpy as np
 
 from labcrane.streams.sync.quality import ClockSegment
@@ -11,6 +14,12 @@ from labcrane.streams.sync.sampling import Sampling
 from labcrane.streams.sync.stamping import wander
 from labcrane.streams.sync.stamping.shifts import MOST_S, Shifts
 from labcrane.types import FloatArray
+
+HALF = 0.5
+"""Two shifts make each other good where less than this part of one remains."""
+
+UNLIKE = 0.02
+"""No delay that changes lets periods differ by more: then one part counts polls, not samples."""
 
 Part = tuple[ClockSegment, Sampling]
 
@@ -32,7 +41,8 @@ def changes(
         Whether the source has a counter.
     """
     found = np.zeros(len(time))
-    for run in _runs(time, parts, counted=counted):
+    for joined in _runs(time, parts, counted=counted):
+        run = _made_good(time, joined, counted=counted)
         whole = slice(run[0][0].start, run[-1][0].stop)
         found[whole] = _shifts(run).open_s(whole.stop - whole.start)
         if lossless and run[0][1].unpaused is not None:
@@ -56,9 +66,39 @@ def _goes_on(time: FloatArray, before: Part, after: Part, *, counted: bool) -> b
     (part, one), (following, other) = before, after
     if part.stop != following.start or (one.unpaused is None) != (other.unpaused is None):
         return False
+    shifts = [np.abs(each.shifted.by_s) for each in (one, other) if each.shifted is not None]
+    if any((each >= MOST_S).any() for each in shifts):  # no delay: a clock was set
+        return False
+    return abs(_late(time, before, after, counted=counted)) < MOST_S
+
+
+def _late(time: FloatArray, before: Part, after: Part, *, counted: bool) -> float:
+    """Return by how much the first sample of a part is later than the count says."""
+    (part, one), (following, other) = before, after
     samples = float(other.index[0] - one.index[-1]) if counted else 1.0
-    step = float(time[following.start] - time[part.stop - 1])
-    return abs(step - samples * other.period) < MOST_S
+    return float(time[following.start] - time[part.stop - 1] - samples * other.period)
+
+
+def _made_good(time: FloatArray, run: list[Part], *, counted: bool) -> list[Part]:
+    """Return the parts without the shifts that a join makes good.
+
+    Where a step is put beside its sample, those between are shifted, and those behind are not.
+    """
+    lates = [_late(time, *both, counted=counted) for both in itertools.pairwise(run)]
+    found = []
+    for k, (part, one) in enumerate(run):
+        if one.shifted is None or one.unpaused is None:
+            found.append((part, one))
+            continue
+        at, by_s = one.shifted.at, one.shifted.by_s
+        good = np.zeros(len(at), dtype=np.bool_)
+        for late in lates[max(k - 1, 0) : k + 1]:
+            good |= np.abs(by_s + late) < HALF * np.abs(by_s)
+        back = np.zeros(len(one.unpaused))
+        np.add.at(back, at[good], by_s[good])
+        kept = Shifts(at[~good], by_s[~good])
+        found.append((part, replace(one, shifted=kept, unpaused=one.unpaused + np.cumsum(back))))
+    return found
 
 
 def _shifts(run: list[Part]) -> Shifts:
@@ -74,6 +114,7 @@ def _shifts(run: list[Part]) -> Shifts:
 
 def _wander(stamps: FloatArray, time: FloatArray, run: list[Part], *, counted: bool) -> FloatArray:
     """Return how the level of stamps changes on both clocks: one of them may be slewed."""
+    period = max(run, key=lambda each: each[0].stop - each[0].start)[1].period
     index, ours, drifted = [], [], []
     paused, drift, last = 0.0, 0.0, -1.0
     for part, one in run:
@@ -84,9 +125,9 @@ def _wander(stamps: FloatArray, time: FloatArray, run: list[Part], *, counted: b
         own = stamps[here] - time[here]
         drifted.append(own - own[0] + drift)
         drift = float(drifted[-1][-1])
-        index.append(one.index if counted else one.index - one.index[0] + last + 1.0)
+        unit = one.period / period if abs(one.period / period - 1.0) > UNLIKE else 1.0
+        index.append(one.index if counted else unit * (one.index - one.index[0]) + last + 1.0)
         last = float(index[-1][-1])
     flow, count = np.concatenate(ours), np.concatenate(index)
-    period = max(run, key=lambda each: each[0].stop - each[0].start)[1].period
     levels = (wander.find(each, count, period) for each in (flow, flow + np.concatenate(drifted)))
     return np.asarray(np.minimum(*levels))

@@ -256,7 +256,7 @@ def examine(
     """
     index = np.arange(len(time), dtype=np.float64) if counter is None else counter
     stalls, longest = _stalls(time, arrival)
-    if len(time) < FEW:
+    if len(time) < FEW or np.ptp(time) == 0.0:  # or of one stamp, as a packet
         waits = _few_waits(time, index, nominal_s) if late else 0.0
         return Sampling(index=index, noise_s=waits, stalls=stalls, longest_stall_s=longest)
     order = np.argsort(time, kind="stable")

@@ -52,10 +52,14 @@ def find(stamps: FloatArray) -> float:
 
 
 def usual(stamps: FloatArray) -> float:
-    """Return the usual unit, as :func:`find` does of others; 0 if there is none."""
+    """Return the usual unit, as :func:`find` does of others; 0 if there is none.
+
+    Stamps that are nearly whole ones may be a schedule, which nothing keeps to a microsecond.
+    """
     blur = 4.0 * float(np.spacing(np.abs(stamps).max(initial=1.0)))
     for unit in USUAL_S:
-        if blur < 0.1 * unit and _rest((stamps - stamps[0]) / unit).max() < WHOLE + blur / unit:
+        rest = _rest((stamps - stamps[0]) / unit).max()
+        if blur < 0.1 * unit and rest < (TOLD_S + blur) / unit:
             return unit
     return 0.0
 
