@@ -257,7 +257,7 @@ TOLD: Mapping[str, str] = {
             "break.start", "block.start", "pause.start", "pause.end", "plugin.slow", "page.denied",
             "questionnaire.refused", "feedback.awaited", "input.lost", "input.back", "disk.lost",
             "disk.back", "stream.lost", "stream.back", "trigger.lost", "trigger.flood",
-            "loop.stalled", "estimate.lost", "estimate.back",
+            "loop.stalled", "estimate.lost", "estimate.back", "stop_rule.unjudged",
         ),
         "",
     ),

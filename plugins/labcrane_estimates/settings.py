@@ -97,7 +97,8 @@ class GazeRegionSettings(EstimateSettings):
     values: ClassVar[tuple[str, ...]] = ("share",)
 
     channels: tuple[str, str]
-    """Labels of the channels of the gaze's place: across, then up or down."""
+    """Labels of the channels of the gaze's place: across, then up or down. What a tracker sends
+    while it sees no eye has to be NaN or outside of the rectangle; some send 0 and 0."""
 
     between_x: Range
     """Edges of the rectangle across, in the unit of the channel: 0 to 1 for most eye trackers."""
