@@ -117,9 +117,9 @@ def _stop_rules(protocol: Mapping[str, Any]) -> list[str]:
             what += _value(rule["questionnaire"])
         limit = _listed({key: rule[key] for key in ("above", "below") if key in rule})
         said.append(f"{what} was {limit}")
-    return [f"The session paused for a decision of the experimenter when {' or '.join(said)}"] * (
-        bool(said)
-    )
+    if not said:
+        return []
+    return [f"The session paused for a decision of the experimenter when {' or '.join(said)}"]
 
 
 def _primary(protocol: Mapping[str, Any]) -> list[str]:
