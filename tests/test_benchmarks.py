@@ -180,7 +180,7 @@ def test_the_parts_of_a_tick_sum_up_and_a_slow_one_is_found(
     whole = found.pop("whole tick")
     assert sum(found.values()) == pytest.approx(whole, abs=1.0)
     assert found["read"] > 2000.0
-    assert all(found[part] < 1000.0 for part in ("control", "step", "judge", "write", "show"))
+    assert found["read"] == max(found.values())
 
 
 @needs("pybullet")
